@@ -1,0 +1,59 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "geometry/collide/contact.h"
+#include "geometry/mesh/tri_mesh.h"
+#include "geometry/terrain/georeference.h"
+#include "geometry/terrain/height_field.h"
+
+namespace effuse::geometry {
+
+/// The ground: a height field or any mesh, behind one set of questions. Solid below / behind its
+/// surface. Immutable and cheap to copy (shared); const queries from many threads.
+///
+/// Height field: closest point by Newton's method on the bilinear surface from the point below,
+/// within 1e-3 cells of the true one up to one cell from the surface. Outside the covered area: no contact.
+///
+/// Mesh (overhangs, caves, several sheets; closed or open): closest point from a CGAL AABB tree, exact;
+/// sign from the angle-weighted pseudonormal of the closest feature (Baerentzen & Aanaes 2005), normal
+/// blended from vertex normals across the triangle so that it is continuous. A point whose closest point
+/// lies on the border of an open mesh, beyond its rim, has no contact.
+class Terrain {
+ public:
+  /// Ground temperature [K] is handed on in every contact.
+  static Terrain from_height_field(HeightField field, Georeference georeference = {}, Real temperature = 0);
+  /// Throws InputError unless the mesh is well formed with at least one triangle of area > 0.
+  static Terrain from_mesh(TriMesh mesh, Georeference georeference = {}, Real temperature = 0);
+
+  /// Nearest ground within reach [m] of p; Contact::any() is false when there is none. Points deep in the
+  /// ground are found at any depth for height fields.
+  Contact contact(const Vec3& p, Real reach = std::numeric_limits<Real>::infinity()) const;
+  /// The same for many points, in parallel; out has their size.
+  void contacts(std::span<const Vec3> points, Real reach, std::span<Contact> out) const;
+
+  /// Signed distance [m], negative in the ground, +infinity where there is none.
+  Real signed_distance(const Vec3& p) const;
+  /// Highest ground above or below (x, y) [m]; nullopt where there is none.
+  std::optional<Real> height(Real x, Real y) const;
+  /// First ground at or below z0 on the vertical through (x, y).
+  std::optional<Real> height_below(Real x, Real y, Real z0) const;
+  /// First hit of the ray p + t d, t in (0, t_max]; the mesh's triangles for both kinds.
+  std::optional<Real> ray(const Vec3& p, const Vec3& d, Real t_max) const;
+
+  bool is_height_field() const;
+  const HeightField* height_field() const;  ///< nullptr for a mesh
+  const TriMesh& mesh() const;              ///< triangulated once for height fields
+  Box3 bounds() const;
+  const Georeference& georeference() const;
+
+ private:
+  struct Impl;
+  explicit Terrain(std::shared_ptr<const Impl> impl);
+  std::shared_ptr<const Impl> impl_;
+};
+
+}  // namespace effuse::geometry
