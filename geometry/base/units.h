@@ -16,6 +16,8 @@ namespace effuse {
 ///            A number alone is SI.
 ///   si_unit  what is wanted, in the same grammar; "" or "1" for a plain number
 ///
+/// A blank after '/' would be read two ways, so "W/m2 K" is refused: write "W/(m2 K)" or "W/m2/K".
+/// Angles have a dimension of their own: "12 deg" is not a plain number, rad/s is not Hz.
 /// degC and degF are points on a scale: they stand alone ("20 degC"), and are shifted to kelvin.
 /// Throws std::invalid_argument that says what was found and what would do, e.g.
 /// "'30 m3' is a volume [m3], wanted a volume rate [m3/s]".

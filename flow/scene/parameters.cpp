@@ -1,0 +1,531 @@
+#include "flow/scene/parameters.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <tuple>
+#include <utility>
+
+#include "geometry/base/check.h"
+#include "geometry/base/units.h"
+
+namespace effuse::flow {
+
+/// One table of the scene as it is being read.
+struct Parameters::Table {
+  struct Entry {
+    std::string key;
+    bool present = false;                        // stands in the scene
+    std::optional<Node> value;                   // a plain value or array, resolved
+    std::vector<std::unique_ptr<Table>> tables;  // one for a table, any number for [[key]]
+    bool array = false;                          // [[key]]
+  };
+
+  const Node* node = nullptr;  // nullptr: absent, or not a table
+  Place place;                 // where a fault of the table itself is shown
+  std::string doc_path;        // "lava.vents[]"
+  std::vector<Entry> entries;  // in the order of reading
+
+  Entry* find(const std::string& key) {
+    const auto found = std::find_if(entries.begin(), entries.end(), [&](const Entry& e) { return e.key == key; });
+    return found == entries.end() ? nullptr : &*found;
+  }
+
+  /// The entry of key, made on the first reading.
+  Entry& entry(const std::string& key) {
+    if (Entry* known = find(key)) return *known;
+    Entry& added = entries.emplace_back();
+    added.key = key;
+    added.present = node && node->find(key);
+    return added;
+  }
+
+  std::vector<std::string> keys() const {
+    std::vector<std::string> names;
+    for (const Entry& e : entries) names.push_back(e.key);
+    return names;
+  }
+};
+
+struct Parameters::Shared {
+  std::unique_ptr<Table> root;
+  std::vector<Fault> faults;
+  std::vector<ParameterDoc> docs;
+
+  void document(const std::string& path, std::string unit, std::string default_value, std::string_view what) {
+    // The tables of an array share their documentation.
+    for (const ParameterDoc& known : docs)
+      if (known.path == path) return;
+    docs.push_back({path, std::move(unit), std::move(default_value), std::string(what)});
+  }
+};
+
+namespace {
+
+std::string joined(const std::string& path, const std::string& key) { return path.empty() ? key : path + "." + key; }
+
+/// The value as it stands in the file, for messages; long text is cut.
+std::string shown(const Node& node) {
+  switch (node.kind) {
+    case Node::Kind::kText: return node.text.size() > 60 ? fmt::format("'{}...'", node.text.substr(0, 57)) : fmt::format("'{}'", node.text);
+    case Node::Kind::kInteger: return fmt::format("{}", node.integer);
+    case Node::Kind::kReal: return fmt::format("{}", node.real);
+    case Node::Kind::kFlag: return node.flag ? "true" : "false";
+    case Node::Kind::kTable:
+    case Node::Kind::kArray: break;
+  }
+  return kind_name(node.kind);
+}
+
+bool plain(std::string_view unit) { return unit.empty() || unit == "1"; }
+
+std::string wanted_number(std::string_view unit) {
+  return plain(unit) ? std::string("a number") : fmt::format("a number in {0}, as 2 or \"2 {0}\"", unit);
+}
+
+/// "> 0", ">= 0 K", "from 1 to 5 m".
+std::string range_text(const Parameters::Range& range, std::string_view unit) {
+  const auto quantity = [&](Real x) { return plain(unit) ? fmt::format("{}", x) : fmt::format("{} {}", x, unit); };
+  const bool below = std::isfinite(range.high), above = std::isfinite(range.low);
+  if (above && below && range.open_low) return fmt::format("above {} and at most {}", quantity(range.low), quantity(range.high));
+  if (above && below) return fmt::format("from {} to {}", quantity(range.low), quantity(range.high));
+  if (below) return fmt::format("at most {}", quantity(range.high));
+  return fmt::format("{} {}", range.open_low ? ">" : ">=", quantity(range.low));
+}
+
+bool inside(Real value, const Parameters::Range& range) {
+  return (range.open_low ? value > range.low : value >= range.low) && value <= range.high;
+}
+
+/// The number a node holds in SI. Throws std::invalid_argument that says what is wrong.
+Real number_of(const Node& node, std::string_view unit) {
+  Real value = 0;
+  switch (node.kind) {
+    case Node::Kind::kInteger: value = static_cast<Real>(node.integer); break;
+    case Node::Kind::kReal: value = node.real; break;
+    case Node::Kind::kText: value = parse_quantity(node.text, unit); break;
+    default: throw std::invalid_argument(fmt::format("found {}, wanted {}", shown(node), wanted_number(unit)));
+  }
+  if (!std::isfinite(value)) throw std::invalid_argument(fmt::format("{} is not a finite number", shown(node)));
+  return value;
+}
+
+Node number_node(Real value, std::string_view unit, const Place& place) {
+  Node node;
+  node.place = place;
+  if (plain(unit)) {
+    node.kind = Node::Kind::kReal;
+    node.real = value;
+  } else {
+    node.kind = Node::Kind::kText;
+    node.text = format_quantity(value, unit);
+  }
+  return node;
+}
+
+Node text_node(std::string text, const Place& place) {
+  Node node;
+  node.kind = Node::Kind::kText;
+  node.place = place;
+  node.text = std::move(text);
+  return node;
+}
+
+std::string list(const std::vector<std::string>& names, std::string_view between) { return fmt::format("{}", fmt::join(names, between)); }
+
+/// "; did you mean 'rate'?", or the names there are.
+std::string suggestion(const std::string& word, const std::vector<std::string>& names) {
+  const std::string nearest = nearest_name(word, names);
+  if (!nearest.empty()) return fmt::format("did you mean '{}'?", nearest);
+  return "there are: " + list(names, ", ");
+}
+
+std::optional<std::size_t> index_of(const std::string& name, const std::vector<std::string>& names) {
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - names.begin());
+}
+
+}  // namespace
+
+Parameters::Parameters(const Node& root) : shared_(std::make_shared<Shared>()) {
+  shared_->root = std::make_unique<Table>();
+  table_ = shared_->root.get();
+  table_->place = root.place;
+  if (root.kind == Node::Kind::kTable) {
+    table_->node = &root;
+  } else {
+    shared_->faults.push_back({root.place, fmt::format("found {}, wanted a table", shown(root))});
+  }
+}
+
+Parameters::Parameters(std::shared_ptr<Shared> shared, Table* table, std::string path)
+    : shared_(std::move(shared)), table_(table), path_(std::move(path)) {}
+
+bool Parameters::has(const std::string& key) const { return table_->node && table_->node->find(key); }
+
+Place Parameters::place(const std::string& key) const {
+  const Node* node = table_->node ? table_->node->find(key) : nullptr;
+  return node ? node->place : table_->place;
+}
+
+void Parameters::fault(const std::string& key, const std::string& message) {
+  const std::string name = key.empty() ? path_ : joined(path_, key);
+  shared_->faults.push_back({place(key), name.empty() ? message : name + ": " + message});
+}
+
+Real Parameters::number(const std::string& key, std::string_view unit, std::optional<Real> fallback, Range range,
+                        std::string_view what) {
+  Table::Entry& entry = table_->entry(key);
+  shared_->document(joined(table_->doc_path, key), plain(unit) ? "" : std::string(unit),
+                    fallback ? format_quantity(*fallback, plain(unit) ? "" : unit) : "", what);
+  const Node* node = table_->node ? table_->node->find(key) : nullptr;
+  Real value = fallback.value_or(0);
+  if (node) {
+    try {
+      const Real given = number_of(*node, unit);
+      if (inside(given, range)) {
+        value = given;
+      } else {
+        fault(key, fmt::format("{} is out of range, must be {}", shown(*node), range_text(range, unit)));
+      }
+    } catch (const std::invalid_argument& error) {
+      fault(key, error.what());
+    }
+  } else if (!fallback) {
+    fault(key, fmt::format("is missing ({}), wanted {}", what, wanted_number(unit)));
+  }
+  entry.value = number_node(value, unit, place(key));
+  return value;
+}
+
+std::int64_t Parameters::integer(const std::string& key, std::optional<std::int64_t> fallback, std::int64_t low, std::int64_t high,
+                                 std::string_view what) {
+  Table::Entry& entry = table_->entry(key);
+  shared_->document(joined(table_->doc_path, key), "whole number", fallback ? fmt::format("{}", *fallback) : "", what);
+  const Node* node = table_->node ? table_->node->find(key) : nullptr;
+  std::int64_t value = fallback.value_or(0);
+  if (node) {
+    std::optional<std::int64_t> given;
+    if (node->kind == Node::Kind::kInteger) given = node->integer;
+    // 240.0 is a whole number, too; beyond 2^53 a double no longer says which.
+    if (node->kind == Node::Kind::kReal && std::abs(node->real) <= 9007199254740992.0 && std::trunc(node->real) == node->real)
+      given = static_cast<std::int64_t>(node->real);
+    if (!given) {
+      fault(key, fmt::format("found {}, wanted a whole number", shown(*node)));
+    } else if (*given < low || *given > high) {
+      fault(key, fmt::format("{} is out of range, must be {}", *given,
+                             high == std::numeric_limits<std::int64_t>::max()  ? fmt::format(">= {}", low)
+                             : low == std::numeric_limits<std::int64_t>::min() ? fmt::format("at most {}", high)
+                                                                               : fmt::format("from {} to {}", low, high)));
+    } else {
+      value = *given;
+    }
+  } else if (!fallback) {
+    fault(key, fmt::format("is missing ({}), wanted a whole number", what));
+  }
+  Node resolved;
+  resolved.kind = Node::Kind::kInteger;
+  resolved.place = place(key);
+  resolved.integer = value;
+  entry.value = std::move(resolved);
+  return value;
+}
+
+bool Parameters::flag(const std::string& key, bool fallback, std::string_view what) {
+  Table::Entry& entry = table_->entry(key);
+  shared_->document(joined(table_->doc_path, key), "flag", fallback ? "true" : "false", what);
+  bool value = fallback;
+  if (const Node* node = table_->node ? table_->node->find(key) : nullptr) {
+    if (node->kind == Node::Kind::kFlag) {
+      value = node->flag;
+    } else {
+      fault(key, fmt::format("found {}, wanted true or false", shown(*node)));
+    }
+  }
+  Node resolved;
+  resolved.kind = Node::Kind::kFlag;
+  resolved.place = place(key);
+  resolved.flag = value;
+  entry.value = std::move(resolved);
+  return value;
+}
+
+std::string Parameters::text(const std::string& key, std::optional<std::string> fallback, std::string_view what) {
+  Table::Entry& entry = table_->entry(key);
+  shared_->document(joined(table_->doc_path, key), "text", !fallback ? "" : fallback->empty() ? "\"\"" : *fallback, what);
+  std::string value = fallback.value_or("");
+  if (const Node* node = table_->node ? table_->node->find(key) : nullptr) {
+    if (node->kind == Node::Kind::kText) {
+      value = node->text;
+    } else {
+      fault(key, fmt::format("found {}, wanted text in quotes", shown(*node)));
+    }
+  } else if (!fallback) {
+    fault(key, fmt::format("is missing ({}), wanted text in quotes", what));
+  }
+  entry.value = text_node(value, place(key));
+  return value;
+}
+
+std::size_t Parameters::choice(const std::string& key, const std::vector<std::string>& names, std::size_t fallback,
+                               std::string_view what) {
+  CHECK_LT(fallback, names.size());
+  Table::Entry& entry = table_->entry(key);
+  shared_->document(joined(table_->doc_path, key), "choice: " + list(names, " | "), names[fallback], what);
+  std::size_t value = fallback;
+  if (const Node* node = table_->node ? table_->node->find(key) : nullptr) {
+    if (node->kind != Node::Kind::kText) {
+      fault(key, fmt::format("found {}, wanted one of: {}", shown(*node), list(names, ", ")));
+    } else if (const auto index = index_of(node->text, names)) {
+      value = *index;
+    } else {
+      fault(key, fmt::format("no such choice {}; {}", shown(*node), suggestion(node->text, names)));
+    }
+  }
+  entry.value = text_node(names[value], place(key));
+  return value;
+}
+
+std::vector<std::size_t> Parameters::choices(const std::string& key, const std::vector<std::string>& names,
+                                             std::vector<std::size_t> fallback, std::string_view what) {
+  for (std::size_t index : fallback) CHECK_LT(index, names.size());
+  Table::Entry& entry = table_->entry(key);
+  std::vector<std::string> defaults;
+  for (std::size_t index : fallback) defaults.push_back(names[index]);
+  shared_->document(joined(table_->doc_path, key), "choices: " + list(names, " | "), "[" + list(defaults, ", ") + "]", what);
+
+  std::vector<std::size_t> value = fallback;
+  if (const Node* node = table_->node ? table_->node->find(key) : nullptr) {
+    bool good = node->kind == Node::Kind::kArray;
+    if (!good) fault(key, fmt::format("found {}, wanted an array of some of: {}", shown(*node), list(names, ", ")));
+    std::vector<std::size_t> given;
+    for (const Node& item : node->items) {
+      std::string wrong;
+      if (item.kind != Node::Kind::kText) {
+        wrong = fmt::format("found {}, wanted one of: {}", shown(item), list(names, ", "));
+      } else if (const auto index = index_of(item.text, names); !index) {
+        wrong = fmt::format("no such choice {}; {}", shown(item), suggestion(item.text, names));
+      } else if (std::find(given.begin(), given.end(), *index) != given.end()) {
+        wrong = fmt::format("{} is given twice", shown(item));
+      } else {
+        given.push_back(*index);
+      }
+      if (wrong.empty()) continue;
+      good = false;
+      shared_->faults.push_back({item.place, joined(path_, key) + ": " + wrong});
+    }
+    if (good) value = given;
+  }
+  Node resolved;
+  resolved.kind = Node::Kind::kArray;
+  resolved.place = place(key);
+  for (std::size_t index : value) resolved.items.push_back(text_node(names[index], resolved.place));
+  entry.value = std::move(resolved);
+  return value;
+}
+
+namespace {
+/// What an array of numbers should look like: "an array of 3 numbers in m".
+std::string wanted_numbers(std::string_view unit, std::size_t count) {
+  return fmt::format("an array of {}numbers{}", count > 0 ? fmt::format("{} ", count) : "", plain(unit) ? "" : fmt::format(" in {}", unit));
+}
+
+/// The numbers of an array node; faults are added with the item's place. nullopt after a fault.
+std::optional<std::vector<Real>> numbers_of(const Node& node, std::string_view unit, std::size_t count, const std::string& name,
+                                            std::vector<Fault>& faults) {
+  if (node.kind != Node::Kind::kArray) {
+    faults.push_back({node.place, fmt::format("{}: found {}, wanted {}", name, shown(node), wanted_numbers(unit, count))});
+    return std::nullopt;
+  }
+  if (count > 0 && node.items.size() != count) {
+    faults.push_back(
+        {node.place, fmt::format("{}: found an array of {}, wanted {}", name, node.items.size(), wanted_numbers(unit, count))});
+    return std::nullopt;
+  }
+  std::vector<Real> values;
+  const std::size_t before = faults.size();
+  for (std::size_t i = 0; i < node.items.size(); ++i) {
+    try {
+      values.push_back(number_of(node.items[i], unit));
+    } catch (const std::invalid_argument& error) {
+      faults.push_back({node.items[i].place, fmt::format("{}[{}]: {}", name, i, error.what())});
+    }
+  }
+  if (faults.size() > before) return std::nullopt;
+  return values;
+}
+
+Node numbers_node(const std::vector<Real>& values, std::string_view unit, const Place& place) {
+  Node node;
+  node.kind = Node::Kind::kArray;
+  node.place = place;
+  for (Real value : values) node.items.push_back(number_node(value, unit, place));
+  return node;
+}
+}  // namespace
+
+std::vector<Real> Parameters::numbers(const std::string& key, std::string_view unit, std::size_t count, bool required,
+                                      std::string_view what) {
+  Table::Entry& entry = table_->entry(key);
+  shared_->document(joined(table_->doc_path, key), wanted_numbers(unit, count), required ? "" : "[]", what);
+  const Node* node = table_->node ? table_->node->find(key) : nullptr;
+  if (!node) {
+    if (!required) return {};
+    fault(key, fmt::format("is missing ({}), wanted {}", what, wanted_numbers(unit, count)));
+    return std::vector<Real>(count, 0);
+  }
+  const auto values = numbers_of(*node, unit, count, joined(path_, key), shared_->faults);
+  if (!values) return std::vector<Real>(required ? count : 0, 0);
+  entry.value = numbers_node(*values, unit, node->place);
+  return *values;
+}
+
+std::vector<std::vector<Real>> Parameters::number_lists(const std::string& key, std::string_view unit, std::size_t width, bool required,
+                                                        std::string_view what) {
+  Table::Entry& entry = table_->entry(key);
+  const std::string wanted = "an array of " + wanted_numbers(unit, width).substr(3) + " each";
+  shared_->document(joined(table_->doc_path, key), wanted, required ? "" : "[]", what);
+  const Node* node = table_->node ? table_->node->find(key) : nullptr;
+  if (!node) {
+    if (required) fault(key, fmt::format("is missing ({}), wanted {}", what, wanted));
+    return {};
+  }
+  if (node->kind != Node::Kind::kArray || (required && node->items.empty())) {
+    fault(key, fmt::format("found {}, wanted {}", node->kind == Node::Kind::kArray ? "an empty array" : shown(*node), wanted));
+    return {};
+  }
+  std::vector<std::vector<Real>> lists;
+  Node resolved;
+  resolved.kind = Node::Kind::kArray;
+  resolved.place = node->place;
+  for (std::size_t i = 0; i < node->items.size(); ++i) {
+    const std::string name = fmt::format("{}[{}]", joined(path_, key), i);
+    if (auto values = numbers_of(node->items[i], unit, width, name, shared_->faults)) {
+      resolved.items.push_back(numbers_node(*values, unit, node->items[i].place));
+      lists.push_back(std::move(*values));
+    }
+  }
+  if (lists.size() != node->items.size()) return {};
+  entry.value = std::move(resolved);
+  return lists;
+}
+
+Parameters Parameters::table(const std::string& key, std::string_view what) {
+  Table::Entry& entry = table_->entry(key);
+  const std::string doc_path = joined(table_->doc_path, key);
+  shared_->document(doc_path, "table", "{}", what);
+  if (entry.tables.empty()) {
+    auto child = std::make_unique<Table>();
+    child->place = place(key);
+    child->doc_path = doc_path;
+    const Node* node = table_->node ? table_->node->find(key) : nullptr;
+    if (node && node->kind == Node::Kind::kTable) {
+      child->node = node;
+    } else if (node) {
+      fault(key, fmt::format("found {}, wanted a table: [{}]", shown(*node), joined(path_, key)));
+    }
+    entry.tables.push_back(std::move(child));
+  }
+  return Parameters(shared_, entry.tables.front().get(), joined(path_, key));
+}
+
+std::vector<Parameters> Parameters::tables(const std::string& key, std::string_view what) {
+  Table::Entry& entry = table_->entry(key);
+  const std::string doc_path = joined(table_->doc_path, key) + "[]";
+  shared_->document(doc_path, "tables", "[]", what);
+  const Node* node = table_->node ? table_->node->find(key) : nullptr;
+  if (!entry.array) {
+    entry.array = true;
+    if (node && node->kind != Node::Kind::kArray) {
+      fault(key, fmt::format("found {}, wanted tables: [[{}]]", shown(*node), joined(path_, key)));
+    } else if (node) {
+      for (const Node& item : node->items) {
+        auto child = std::make_unique<Table>();
+        child->place = item.place;
+        child->doc_path = doc_path;
+        if (item.kind == Node::Kind::kTable) {
+          child->node = &item;
+          entry.tables.push_back(std::move(child));
+        } else {
+          shared_->faults.push_back(
+              {item.place, fmt::format("{0}: found {1}, wanted a table: [[{0}]]", joined(path_, key), shown(item))});
+        }
+      }
+    }
+  }
+  std::vector<Parameters> all;
+  for (std::size_t i = 0; i < entry.tables.size(); ++i)
+    all.push_back(Parameters(shared_, entry.tables[i].get(), fmt::format("{}[{}]", joined(path_, key), i)));
+  return all;
+}
+
+std::vector<Fault> Parameters::faults() const { return shared_->faults; }
+
+void Parameters::finish() {
+  std::vector<Fault> faults = shared_->faults;
+
+  // Keys nobody asked for, in every table that was read.
+  const auto unread = [&](auto& self, Table& table, const std::string& path) -> void {
+    if (table.node) {
+      const std::vector<std::string> known = table.keys();
+      for (std::size_t i = 0; i < table.node->entries.size(); ++i) {
+        const std::string& key = table.node->entries[i].first;
+        if (table.find(key)) continue;
+        const Place where = i < table.node->key_places.size() ? table.node->key_places[i] : table.node->entries[i].second.place;
+        std::string advice = nearest_name(key, known);
+        if (!advice.empty()) {
+          advice = fmt::format("did you mean '{}'?", advice);
+        } else {
+          // The right name in the wrong table.
+          for (const ParameterDoc& doc : shared_->docs)
+            if (advice.empty() && doc.path.size() > key.size() && doc.path.ends_with("." + key))
+              advice = fmt::format("there is '{}'", doc.path);
+          if (advice.empty()) advice = known.empty() ? "nothing is read here" : "known here: " + list(known, ", ");
+        }
+        faults.push_back({where, fmt::format("{}: unknown key; {}", joined(path, key), advice)});
+      }
+    }
+    for (Table::Entry& entry : table.entries)
+      for (std::size_t i = 0; i < entry.tables.size(); ++i)
+        self(self, *entry.tables[i], joined(path, entry.key) + (entry.array ? fmt::format("[{}]", i) : ""));
+  };
+  unread(unread, *shared_->root, "");
+  if (faults.empty()) return;
+
+  // In the order of the file; what has no line (--set) comes last.
+  std::stable_sort(faults.begin(), faults.end(), [](const Fault& a, const Fault& b) {
+    const auto rank = [](const Place& p) { return std::tuple(p.line == 0, p.line, p.column); };
+    return rank(a.place) < rank(b.place);
+  });
+  throw InputError(std::move(faults));
+}
+
+Node Parameters::resolved() const {
+  const auto tree = [](auto& self, const Table& table) -> Node {
+    Node node;
+    node.kind = Node::Kind::kTable;
+    node.place = table.place;
+    for (const Table::Entry& entry : table.entries) {
+      if (entry.value) node.set(entry.key, *entry.value);
+      if (entry.array && (entry.present || !entry.tables.empty())) {
+        Node array;
+        array.kind = Node::Kind::kArray;
+        for (const auto& child : entry.tables) array.items.push_back(self(self, *child));
+        node.set(entry.key, std::move(array));
+      } else if (!entry.array && !entry.tables.empty()) {
+        Node child = self(self, *entry.tables.front());
+        // An absent table whose reader asked for nothing stays absent.
+        if (entry.present || !child.entries.empty()) node.set(entry.key, std::move(child));
+      }
+    }
+    return node;
+  };
+  return tree(tree, *table_);
+}
+
+std::vector<ParameterDoc> Parameters::docs() const { return shared_->docs; }
+
+}  // namespace effuse::flow

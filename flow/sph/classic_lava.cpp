@@ -1,0 +1,556 @@
+#include "flow/sph/classic_lava.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/base/check.h"
+#include "geometry/base/error.h"
+#include "geometry/base/parallel.h"
+#include "geometry/base/random.h"
+#include "geometry/base/zones.h"
+
+namespace effuse::flow::sph {
+
+namespace {
+constexpr Index kNone = ~Index{0};
+constexpr int kSortInterval = 16;    // steps between two orderings of the particles in memory
+constexpr int kMaxRetries = 8;
+constexpr Real kClumped = 1.25;      // a summed density this many times the continuity density is a clump
+constexpr Real kClearance = 0.25;    // a particle stays this many spacings off the ground
+constexpr std::string_view kModel = "classic 1";  // of a checkpoint: changes with what is saved
+constexpr std::uint64_t kPhaseStream = 1;  // random numbers: when a vent's sites start
+
+/// Calls f with the kernel that kind names.
+template <class F>
+auto with_kernel(KernelKind kind, Real support, F&& f) {
+  switch (kind) {
+    case KernelKind::kCubicSpline: return f(CubicSpline(support));
+    case KernelKind::kWendlandC2: return f(WendlandC2(support));
+    default: return f(SpikyKernel(support));
+  }
+}
+
+/// values[k] = values[which[k]]
+template <class T>
+void gather(std::vector<T>& values, const std::vector<Index>& which) {
+  std::vector<T> out(which.size());
+  parallel_for(which.size(), [&](std::size_t k) { out[k] = values[which[k]]; }, 4096);
+  values.swap(out);
+}
+}  // namespace
+
+Real ExponentialViscosity::a() const { return std::log(cold_nu / hot_nu) / (hot_temperature - cold_temperature); }
+Real ExponentialViscosity::b() const { return hot_nu * std::exp(a() * hot_temperature); }
+// Written about the hot point: exp(a T) alone overflows for steep laws.
+Real ExponentialViscosity::at(Real temperature) const { return std::min(max, hot_nu * std::exp(a() * (hot_temperature - temperature))); }
+
+void add_scaled_velocities(LavaState& y, Real a, const LavaState& k) {
+  parallel_for(y.size(), [&](std::size_t i) {
+    y.v[i] += a * k.v[i];
+    y.T[i] += a * k.T[i];
+  }, 4096);
+}
+
+void add_scaled_positions(LavaState& y, Real a, const LavaState& k) {
+  parallel_for(y.size(), [&](std::size_t i) {
+    y.x[i] += a * k.x[i];
+    y.rho[i] += a * k.rho[i];
+  }, 4096);
+}
+
+struct ClassicLava::System {
+  ClassicLava& lava;
+  void rates(Real, const LavaState& y, LavaState& k) { lava.compute_rates(y, k, true, true); }
+  void velocity_rates(Real, const LavaState& y, LavaState& k) { lava.compute_rates(y, k, true, false); }
+  void position_rates(Real, const LavaState& y, LavaState& k) { lava.compute_rates(y, k, false, true); }
+};
+
+ClassicLava::ClassicLava(const ClassicOptions& options, std::vector<Vent> vents, std::vector<ContactSource> ground, std::function<bool(const Vec3&)> inside)
+    : options_(options),
+      vents_(std::move(vents)),
+      ground_(std::move(ground)),
+      inside_(std::move(inside)),
+      mass_(options.density * std::pow(options.spacing, 3)),
+      support_(options.support * options.spacing),
+      half_space_(with_kernel(options.kernel, support_, [](const auto& kernel) { return HalfSpaceTable(kernel); })),
+      density_kernel_(support_),
+      density_half_space_(density_kernel_) {
+  CHECK_GT(options.spacing, 0.0);
+  CHECK_GE(options.support, 1.5);
+  CHECK_GT(options.density, 0.0);
+  CHECK_GT(options.stiffness, 0.0);
+  CHECK_GT(options.heat_capacity, 0.0);
+  CHECK_GT(options.courant, 0.0);
+  CHECK_GT(options.max_step, 0.0);
+  CHECK_GE(options.surface_interval, 1);
+  place_sites();
+  rest2_born_ = -options_.rest_period / 2;
+}
+
+void ClassicLava::place_sites() {
+  for (std::size_t v = 0; v < vents_.size(); ++v) {
+    const std::vector<Vec3> lattice = vents_[v].lattice(options_.spacing);
+    for (Vec3 at : lattice) {
+      // Down (or up) onto the ground by Newton's method on the signed distance along the vertical.
+      Vec3 up = Vec3::UnitZ();
+      for (int iteration = 0; iteration < 20; ++iteration) {
+        geometry::Contact nearest;
+        for (const ContactSource& source : ground_) {
+          geometry::Contact contact;
+          source({&at, 1}, std::numeric_limits<Real>::infinity(), {&contact, 1});
+          if (contact.distance < nearest.distance) nearest = contact;
+        }
+        if (!nearest.any()) break;
+        up = nearest.normal;
+        at.z() -= nearest.distance / std::max(up.z(), 0.2);
+        if (std::abs(nearest.distance) < 1e-6 * options_.spacing) break;
+      }
+      const Real phase = random_uniform(options_.seed, kPhaseStream, sites_.size());
+      sites_.push_back({at, up, static_cast<Index>(v), static_cast<Real>(lattice.size()) * std::pow(options_.spacing, 3), phase});
+    }
+  }
+}
+
+void ClassicLava::born(const Vec3& x, const Vec3& v, Real temperature) {
+  y_.x.push_back(x);
+  y_.v.push_back(v);
+  y_.rho.push_back(options_.density);
+  y_.T.push_back(temperature);
+  id_.push_back(next_id_++);
+  birth_.push_back(time_);
+  site_.push_back(kFree);
+  number_.push_back(0);
+  rest_.push_back(x);
+  rest2_.push_back(x);
+  surface_.push_back(1);
+  outward_.push_back(Vec3::Zero());
+  ground_bound_.push_back(-std::numeric_limits<Real>::infinity());
+  ++emitted_;
+}
+
+void ClassicLava::add(std::span<const Vec3> x, std::span<const Vec3> v, std::span<const Real> temperature) {
+  CHECK_EQ(v.size(), x.size());
+  CHECK_EQ(temperature.size(), x.size());
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    CHECK(x[i].allFinite() && v[i].allFinite() && std::isfinite(temperature[i]));
+    born(x[i], v[i], temperature[i]);
+  }
+}
+
+std::size_t ClassicLava::emit(Real t0, Real t1) {
+  const std::size_t before = size();
+  const Real dx = options_.spacing;
+  for (std::size_t s = 0; s < sites_.size(); ++s) {
+    const Site& site = sites_[s];
+    const Vent& vent = vents_[site.vent];
+    const Real risen0 = vent.volume(t0) / site.share + site.phase, risen1 = vent.volume(t1) / site.share + site.phase;
+    for (Real k = std::floor(risen0) + 1; k <= std::floor(risen1); k += 1) {
+      born(site.at + site.up * ((risen1 - k) * dx), site.up * ((risen1 - risen0) * dx / (t1 - t0)), vent.temperature);
+      site_.back() = static_cast<Index>(s);
+      number_.back() = k;
+      // What comes out of a vent was, when the material coordinates were born, that far down the conduit.
+      rest_.back() -= site.up * ((risen1 - site.phase - vent.volume(rest_born_) / site.share) * dx);
+      rest2_.back() -= site.up * ((risen1 - site.phase - vent.volume(rest2_born_) / site.share) * dx);
+    }
+  }
+  return size() - before;
+}
+
+void ClassicLava::carry(Real dt) {
+  for (std::size_t i = 0; i < size(); ++i) {
+    if (site_[i] == kFree) continue;
+    const Site& site = sites_[site_[i]];
+    const Vent& vent = vents_[site.vent];
+    const Real volume = vent.volume(time_);
+    if (time_ >= vent.stop || volume / site.share + site.phase - number_[i] >= 1) {
+      site_[i] = kFree;
+    } else {
+      y_.v[i] = site.up * ((vent.volume(time_ + dt) - volume) / site.share * options_.spacing / dt);
+    }
+  }
+}
+
+void ClassicLava::keep(const std::vector<Index>& which) {
+  gather(y_.x, which);
+  gather(y_.v, which);
+  gather(y_.rho, which);
+  gather(y_.T, which);
+  gather(id_, which);
+  gather(birth_, which);
+  gather(site_, which);
+  gather(number_, which);
+  gather(rest_, which);
+  gather(rest2_, which);
+  gather(surface_, which);
+  gather(outward_, which);
+  gather(ground_bound_, which);
+}
+
+void ClassicLava::sort_particles() {
+  ZONE("sph.sort");
+  grid_.build(y_.x, support_);
+  keep({grid_.order().begin(), grid_.order().end()});
+}
+
+void ClassicLava::find_neighbors(std::span<const Vec3> x) {
+  grid_.build(x, support_);
+  neighbors_.find(grid_, support_);
+  neighbors_of_ = x.data();
+}
+
+void ClassicLava::find_contacts() {
+  ZONE("sph.contacts");
+  contact_of_.clear();
+  query_.clear();
+  contact_index_.assign(size(), kNone);
+  for (std::size_t i = 0; i < size(); ++i) {
+    if (!surface_[i] && ground_bound_[i] > support_) continue;
+    contact_index_[i] = static_cast<Index>(contact_of_.size());
+    contact_of_.push_back(static_cast<Index>(i));
+    query_.push_back(y_.x[i]);
+  }
+  const std::size_t n = query_.size();
+  contacts_.resize(n * ground_.size());
+  for (std::size_t s = 0; s < ground_.size(); ++s) ground_[s](query_, support_, std::span(contacts_).subspan(s * n, n));
+  parallel_for(n, [&](std::size_t q) {
+    // Nothing within reach: at least the reach away.
+    Real bound = support_;
+    for (std::size_t s = 0; s < ground_.size(); ++s) bound = std::min(bound, contacts_[s * n + q].distance);
+    ground_bound_[contact_of_[q]] = bound;
+  }, 4096);
+  COUNT("sph.contact queries", n * ground_.size());
+}
+
+void ClassicLava::compute_rates(const LavaState& y, LavaState& k, bool velocities, bool positions) {
+  if (neighbors_of_ != y.x.data()) find_neighbors(y.x);
+  // A kick leaves the positions, and so the lists, as they are; anything else moves them.
+  if (positions) neighbors_of_ = nullptr;
+  with_kernel(options_.kernel, support_, [&](const auto& kernel) {
+    if (velocities && positions) return accumulate<true, true>(kernel, y, k);
+    if (velocities) return accumulate<true, false>(kernel, y, k);
+    return accumulate<false, true>(kernel, y, k);
+  });
+  COUNT("sph.rate evaluations", velocities ? y.size() : 0);
+}
+
+template <bool kVelocities, bool kPositions, class Kernel>
+void ClassicLava::accumulate(const Kernel& kernel, const LavaState& y, LavaState& k) {
+  ZONE(kVelocities ? "sph.forces" : "sph.density");
+  const std::size_t n = y.size();
+  const Real m = mass_, rho0 = options_.density, stiffness = options_.stiffness;
+  const Real mean_to_laplacian = 2 / kernel.second_moment();
+  const Real kappa = options_.diffusivity * mean_to_laplacian;
+  const Real sound = std::sqrt(stiffness);
+  const Real diffuse_per_mass = options_.density_diffusion * support_ * sound;
+  const Real unclump = 0.5 * sound / options_.spacing;
+  const Real exchange = rho0 / (m * options_.heat_capacity);
+  k.x.resize(n);
+  k.v.resize(n);
+  k.rho.resize(n);
+  k.T.resize(n);
+  packed_.resize(n);
+
+  // What neighbours ask of a particle, side by side in memory: one or two cache lines a neighbour.
+  parallel_for(n, [&](std::size_t i) {
+    const Real pressure = stiffness * (y.rho[i] - rho0);
+    const Real felt = pressure < 0 ? options_.cohesion * pressure : pressure;
+    packed_[i] = {y.x[i], felt / (y.rho[i] * y.rho[i]), y.v[i], kVelocities ? options_.viscosity.at(y.T[i]) : 0, y.T[i], y.rho[i]};
+  }, 2048);
+
+  parallel_for(n, [&](std::size_t i) {
+    const Packed& a = packed_[i];
+    Vec3 force = Vec3::Zero(), drag = Vec3::Zero();
+    Real drho = 0, dT = 0, summed = density_kernel_.W(0);
+    for (const Index j : neighbors_[i]) {
+      const Packed& b = packed_[j];
+      const Vec3 d = a.x - b.x;
+      const Real r = d.norm();
+      // Two particles at one place have no direction to push in; a vent never makes such a pair.
+      const Real slope = r > 0 ? kernel.dW(r) / r : 0;  // grad W = slope d
+      const Vec3 dv = b.v - a.v;
+      if constexpr (kPositions) {
+        summed += density_kernel_.W(r);
+        drho -= slope * (dv.dot(d) + diffuse_per_mass * (b.rho - a.rho) / b.rho);
+      }
+      if constexpr (kVelocities) {
+        force -= (a.p_over_rho2 + b.p_over_rho2) * slope * d;
+        const Real w = kernel.W(r) * 2 / (a.rho + b.rho);
+        drag += 2 * a.nu * b.nu / (a.nu + b.nu) * w * dv;
+        dT += w * (b.T - a.T);
+      }
+    }
+    Vec3 acceleration = m * force + (mean_to_laplacian * m) * drag + options_.gravity;
+    drho *= m;
+    dT *= kappa * m;
+    summed *= m;
+
+    bool grounded = false;
+    const Real r2_over_rho = kVelocities && surface_[i] ? std::pow(m / a.rho, 2.0 / 3.0) / a.rho : 0;  // 0: exchanges nothing
+    if (contact_index_[i] != kNone) {
+      for (std::size_t s = 0; s < ground_.size(); ++s) {
+        const geometry::Contact& c = contacts_[s * contact_of_.size() + contact_index_[i]];
+        if (!c.any()) continue;
+        const Vec3& normal = c.normal;
+        const Real d = c.distance + normal.dot(a.x - query_[contact_index_[i]]);
+        if (d >= support_) continue;
+        const Real area = half_space_.slope(d);  // < 0
+        const Vec3 dv = c.surface_velocity - a.v;
+        acceleration -= 2 * rho0 * std::max(a.p_over_rho2, 0.0) * area * normal;
+        acceleration += (mean_to_laplacian * options_.ground_friction * a.nu * half_space_.gamma(d)) * dv;
+        drho -= 2 * rho0 * area * dv.dot(normal);
+        summed += rho0 * density_half_space_.gamma(d);
+        if (d < options_.spacing) {
+          grounded = true;
+          const Real T_ground = c.surface_temperature > 0 ? c.surface_temperature : options_.ground_temperature;
+          dT -= options_.ground_exchange * exchange * r2_over_rho * (a.T - T_ground);
+        }
+      }
+    }
+    if (surface_[i]) {
+      // To the air goes what does not lie on the ground; a sheet one particle thick has both sides.
+      const bool covered = grounded && outward_[i].dot(contacts_[contact_index_[i]].normal) < -0.3;
+      if (!covered) dT -= options_.air_exchange * exchange * r2_over_rho * (a.T - options_.air_temperature);
+    }
+    // The sum misses what is beyond a free surface, so the true density is no lower; disorder alone
+    // lifts it by less than the margin.
+    drho += unclump * std::max(0.0, summed - kClumped * a.rho);
+
+    const bool held = site_[i] != kFree;
+    if constexpr (kPositions) {
+      k.x[i] = a.v;
+      k.rho[i] = drho;
+    }
+    if constexpr (kVelocities) {
+      k.v[i] = held ? Vec3(Vec3::Zero()) : acceleration;
+      k.T[i] = held ? 0 : dT;
+    }
+  }, 256);
+}
+
+const LavaState& ClassicLava::rates() {
+  find_neighbors(y_.x);
+  find_surface(y_.x, neighbors_, support_, options_.surface, surface_, outward_);
+  find_contacts();
+  compute_rates(y_, storage_.k1, true, true);
+  return storage_.k1;
+}
+
+Real ClassicLava::stable_step() const {
+  const Real speed = std::sqrt(parallel_max(size(), 0, [&](std::size_t i) { return y_.v[i].squaredNorm(); }));
+  const Real coldest = -parallel_max(size(), -1e6, [&](std::size_t i) { return -y_.T[i]; });
+  const Real m2 = with_kernel(options_.kernel, support_, [](const auto& kernel) { return kernel.second_moment(); });
+  Real dt = std::min(options_.max_step, options_.courant * support_ / 2 / (std::sqrt(options_.stiffness) + speed));
+  if (size() > 0) dt = std::min(dt, 0.35 * m2 / options_.viscosity.at(coldest));
+  if (max_acceleration_ > 0) dt = std::min(dt, 0.4 * std::sqrt(options_.spacing / max_acceleration_));
+  return dt;
+}
+
+bool ClassicLava::acceptable() const {
+  const Real limit = options_.spacing / 2;
+  const Real worst = parallel_max(size(), 0, [&](std::size_t i) {
+    const bool good = y_.v[i].allFinite() && std::isfinite(y_.T[i]) && y_.rho[i] > 0.1 * options_.density && y_.rho[i] < 10 * options_.density &&
+                      (y_.x[i] - before_.x[i]).squaredNorm() < limit * limit;
+    return good ? 0.0 : 1.0;
+  });
+  return worst == 0;
+}
+
+std::size_t ClassicLava::leave_ground_behind() {
+  ZONE("sph.contacts");
+  const Real clearance = kClearance * options_.spacing;
+  std::vector<Index> suspects;
+  for (std::size_t i = 0; i < size(); ++i) {
+    ground_bound_[i] -= (y_.x[i] - before_.x[i]).norm();
+    if (ground_bound_[i] < clearance && site_[i] == kFree) suspects.push_back(static_cast<Index>(i));
+  }
+  COUNT("sph.contact queries", suspects.size() * ground_.size());
+
+  std::vector<Vec3> at(suspects.size());
+  std::vector<geometry::Contact> contact(suspects.size());
+  std::vector<std::uint8_t> touches(suspects.size(), 0);
+  for (std::size_t q = 0; q < suspects.size(); ++q) ground_bound_[suspects[q]] = support_;
+  for (const ContactSource& source : ground_) {
+    for (std::size_t q = 0; q < suspects.size(); ++q) at[q] = y_.x[suspects[q]];
+    source(at, support_, contact);
+    for (std::size_t q = 0; q < suspects.size(); ++q) {
+      const geometry::Contact& c = contact[q];
+      if (!c.any()) continue;
+      const Index i = suspects[q];
+      touches[q] = 1;
+      ground_bound_[i] = std::min(ground_bound_[i], c.distance);
+      if (c.distance >= clearance) continue;
+      y_.x[i] += (clearance - c.distance) * c.normal;
+      const Real into = (y_.v[i] - c.surface_velocity).dot(c.normal);
+      if (into < 0) y_.v[i] -= into * c.normal;
+      ground_bound_[i] = clearance;
+    }
+  }
+  if (!inside_) return 0;
+
+  // No ground within reach: in the air above it, or over its edge.
+  std::vector<Index> stay;
+  std::size_t next = 0, gone = 0;
+  std::vector<std::uint8_t> lost(size(), 0);
+  for (std::size_t q = 0; q < suspects.size(); ++q) {
+    const Index i = suspects[q];
+    if (!touches[q] && !inside_(y_.x[i])) {
+      lost[i] = 1;
+      ++gone;
+    } else if (!touches[q]) {
+      ground_bound_[i] = 0;  // look again at the next step
+    }
+  }
+  if (gone == 0) return 0;
+  for (; next < size(); ++next)
+    if (!lost[next]) stay.push_back(static_cast<Index>(next));
+  keep(stay);
+  left_ += gone;
+  return gone;
+}
+
+void ClassicLava::renew_rest() {
+  const Real period = options_.rest_period;
+  if (period <= 0) return;
+  if (time_ - rest_born_ >= period) {
+    rest_ = y_.x;
+    rest_born_ += period * std::floor((time_ - rest_born_) / period);
+  }
+  if (time_ - rest2_born_ >= period) {
+    rest2_ = y_.x;
+    rest2_born_ += period * std::floor((time_ - rest2_born_) / period);
+  }
+}
+
+StepReport ClassicLava::step(Real dt_max) {
+  ZONE("sph.step");
+  CHECK_GT(dt_max, 0.0);
+  StepReport report;
+  Real dt = std::min(dt_max, stable_step());
+
+  neighbors_of_ = nullptr;
+  if (steps_ % kSortInterval == 0) sort_particles();
+  if (steps_ % static_cast<std::uint64_t>(options_.surface_interval) == 0 && size() > 0) {
+    find_neighbors(y_.x);
+    find_surface(y_.x, neighbors_, support_, options_.surface, surface_, outward_);
+  }
+  find_contacts();
+  carry(dt);
+  before_ = y_;
+  for (;; ++report.retries, dt /= 2) {
+    integrate_step(options_.scheme, System{*this}, time_, dt, y_, storage_);
+    if (acceptable()) break;
+    y_ = before_;
+    neighbors_of_ = nullptr;
+    if (report.retries == kMaxRetries)
+      throw UnstableError(fmt::format("the step at t = {:.6g} s stayed unstable down to dt = {:.3g} s ({} particles, stiffness {} m2/s2)", time_, dt, size(),
+                                      options_.stiffness));
+  }
+  max_acceleration_ = std::sqrt(parallel_max(size(), 0, [&](std::size_t i) { return ((y_.v[i] - before_.v[i]) / dt).squaredNorm(); }));
+  time_ += dt;
+  ++steps_;
+  report.left = leave_ground_behind();
+  report.emitted = emit(time_ - dt, time_);
+  renew_rest();
+
+  report.dt = dt;
+  report.neighbor_pairs = neighbors_.pairs();
+  report.max_speed = std::sqrt(parallel_max(size(), 0, [&](std::size_t i) { return y_.v[i].squaredNorm(); }));
+  report.max_compression = parallel_max(size(), 0, [&](std::size_t i) { return y_.rho[i] / options_.density - 1; });
+  report.max_temperature = parallel_max(size(), 0, [&](std::size_t i) { return y_.T[i]; });
+  report.min_temperature = -parallel_max(size(), -1e6, [&](std::size_t i) { return -y_.T[i]; });
+  COUNT("sph.steps", 1);
+  return report;
+}
+
+geometry::Points ClassicLava::points() const {
+  const std::size_t n = size();
+  radius_.assign(n, options_.spacing / 2);
+  crust_.resize(n);
+  age_.resize(n);
+  const ExponentialViscosity& law = options_.viscosity;
+  for (std::size_t i = 0; i < n; ++i) {
+    crust_[i] = std::clamp((law.hot_temperature - y_.T[i]) / (law.hot_temperature - law.cold_temperature), 0.0, 1.0);
+    age_[i] = time_ - birth_[i];
+  }
+  geometry::Points points;
+  points.position = y_.x;
+  points.radius = radius_;
+  points.velocity = y_.v;
+  points.temperature = y_.T;
+  points.crust = crust_;
+  points.age = age_;
+  points.id = id_;
+  points.surface = surface_;
+  points.rest = rest_;
+  points.rest2 = rest2_;
+  // Each set weighs nothing at its birth and just before its next one.
+  if (options_.rest_period > 0) points.rest_ratio = std::abs(2 * (time_ - rest_born_) / options_.rest_period - 1);
+  return points;
+}
+
+std::size_t ClassicLava::memory() const {
+  const std::size_t n = y_.x.capacity();
+  return n * (6 * sizeof(Vec3) + 2 * sizeof(Real) + 2 * sizeof(Real) + sizeof(std::uint64_t) + 1 + sizeof(Real)) + packed_.capacity() * sizeof(Packed) +
+         contacts_.capacity() * sizeof(geometry::Contact) + grid_.memory() + neighbors_.memory() + 2 * n * (2 * sizeof(Vec3) + 2 * sizeof(Real));
+}
+
+void ClassicLava::add_to(StateHash& hash) const {
+  hash.add(std::span<const Vec3>(y_.x));
+  hash.add(std::span<const Vec3>(y_.v));
+  hash.add(std::span<const Real>(y_.rho));
+  hash.add(std::span<const Real>(y_.T));
+  hash.add(std::span<const std::uint64_t>(id_));
+  hash.add(std::span<const Real>(birth_));
+  hash.add(std::span<const Vec3>(rest_));
+  hash.add(std::span<const Vec3>(rest2_));
+  hash.add(std::span<const std::uint8_t>(surface_));
+  hash.add(time_);
+  hash.add(steps_);
+}
+
+template <class Self, class Archive>
+void ClassicLava::archive(Self& self, Archive& io) {
+  io.array("x", self.y_.x);
+  io.array("v", self.y_.v);
+  io.array("rho", self.y_.rho);
+  io.array("T", self.y_.T);
+  io.array("id", self.id_);
+  io.array("birth", self.birth_);
+  io.array("site", self.site_);
+  io.array("number", self.number_);
+  io.array("rest", self.rest_);
+  io.array("rest2", self.rest2_);
+  io.array("surface", self.surface_);
+  io.array("outward", self.outward_);
+  io.array("ground_bound", self.ground_bound_);
+  io.value("time", self.time_);
+  io.value("rest_born", self.rest_born_);
+  io.value("rest2_born", self.rest2_born_);
+  io.value("next_id", self.next_id_);
+  io.value("emitted", self.emitted_);
+  io.value("left", self.left_);
+  io.value("steps", self.steps_);
+  io.value("max_acceleration", self.max_acceleration_);
+}
+
+void ClassicLava::save(StateWriter& out) const {
+  out.text("model", kModel);
+  archive(*this, out);
+}
+
+void ClassicLava::load(StateReader& in) {
+  std::string model;
+  in.text("model", model);
+  if (model != kModel) throw InputError(Place{}, fmt::format("the checkpoint holds a '{:.40}' lava, wanted '{}'", model, kModel));
+  archive(*this, in);
+  const std::size_t n = y_.size();
+  for (const Index site : site_)
+    if (site != kFree && site >= sites_.size()) throw InputError(Place{}, fmt::format("the checkpoint names vent site {} of {}", site, sites_.size()));
+  for (const std::size_t other : {y_.v.size(), y_.rho.size(), y_.T.size(), id_.size(), birth_.size(), site_.size(), number_.size(), rest_.size(),
+                                  rest2_.size(), surface_.size(), outward_.size(), ground_bound_.size()})
+    if (other != n) throw InputError(Place{}, fmt::format("the checkpoint's arrays disagree: {} and {} particles", n, other));
+}
+
+}  // namespace effuse::flow::sph

@@ -1,0 +1,229 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "flow/integrate/integrate.h"
+#include "flow/sph/column_grid.h"
+#include "flow/sph/kernel.h"
+#include "flow/sph/surface_particles.h"
+#include "flow/sph/vent.h"
+#include "geometry/base/hash.h"
+#include "geometry/base/state_io.h"
+#include "geometry/collide/contact.h"
+#include "geometry/mesh/points.h"
+
+/// The lava of Stora, Agliati, Cani, Neyret & Gascuel 1999, "Animating Lava Flows", on the smoothed
+/// particles of Desbrun & Gascuel 1996. Stands on its own: needs points to collide with, no scene.
+namespace effuse::flow::sph {
+
+/// nu(T) = b exp(-a T), from two measured points; never above max (explicit steps pay for it:
+/// dt <= 0.35 m2 / nu).
+struct ExponentialViscosity {
+  Real hot_nu = 0.5, hot_temperature = 1473.15;    ///< [m^2/s], [K]
+  Real cold_nu = 10, cold_temperature = 1173.15;   ///< [m^2/s], [K]
+  Real max = 15;                                   ///< [m^2/s]
+
+  Real a() const;  ///< [1/K] = ln(cold_nu / hot_nu) / (hot_temperature - cold_temperature)
+  Real b() const;  ///< [m^2/s] = hot_nu exp(a hot_temperature)
+  Real at(Real temperature) const;
+};
+
+struct ClassicOptions {
+  Real spacing = 1;           ///< dx [m]; a particle's volume at rest is dx^3
+  Real support = 2;           ///< of the kernel, in spacings
+  KernelKind kernel = KernelKind::kSpiky;
+  Real density = 2600;        ///< rho0 [kg/m^3]
+  Real stiffness = 900;       ///< k in P = k (rho - rho0) [m^2/s^2]; sqrt(k) is the speed of sound
+  Real cohesion = 0.3;        ///< of negative pressure, 1: as the state equation says; less clumps less
+  Real density_diffusion = 0.1;  ///< delta of Molteni & Colagrossi 2009; 0: the paper's continuity equation alone
+  ExponentialViscosity viscosity;
+  Real ground_friction = 1;   ///< of the viscous drag of the ground: 1 no slip, 0 free slip
+  Real diffusivity = 1e-6;    ///< heat inside [m^2/s]
+  Real heat_capacity = 1150;  ///< [J/kg/K]
+  Real air_exchange = 60, air_temperature = 288.15;     ///< [W/m^2/K], [K]
+  Real ground_exchange = 60, ground_temperature = 288.15;  ///< [W/m^2/K], [K] where a contact brings none
+  Vec3 gravity = Vec3(0, 0, -kGravity);  ///< [m/s^2]
+  Scheme scheme = Scheme::kSymplecticEuler;
+  Real courant = 0.4;         ///< of  (support / 2) / (sqrt(k) + max |v|)
+  Real max_step = 0.1;        ///< [s]
+  SurfaceCriteria surface;
+  int surface_interval = 4;   ///< steps between two looks at who is on the surface
+  Real rest_period = 60;      ///< [s] between two births of one set of material coordinates; 0: never
+  std::uint64_t seed = 1;
+};
+
+/// Fills out[i] with the nearest surface to x[i] of one solid (any() false: none within reach).
+using ContactSource = std::function<void(std::span<const Vec3> x, Real reach, std::span<geometry::Contact> out)>;
+
+/// What the integrator moves; the rates have the same layout.
+struct LavaState {
+  std::vector<Vec3> x, v;      ///< [m], [m/s]
+  std::vector<Real> rho, T;    ///< [kg/m^3], [K]
+  std::size_t size() const { return x.size(); }
+};
+void add_scaled_velocities(LavaState& y, Real a, const LavaState& k);  ///< v, T
+void add_scaled_positions(LavaState& y, Real a, const LavaState& k);   ///< x, rho
+
+/// What one step did.
+struct StepReport {
+  Real dt = 0;                  ///< [s]
+  int retries = 0;              ///< steps thrown away because numbers went bad
+  std::size_t emitted = 0, left = 0;
+  std::size_t neighbor_pairs = 0;
+  Real max_speed = 0;           ///< [m/s]
+  Real max_compression = 0;     ///< max rho / rho0 - 1
+  Real max_temperature = 0, min_temperature = 0;  ///< [K]
+};
+
+/// Equations, for particle i, kernel W with second moment m2, pair means rho_ij = (rho_i + rho_j)/2
+/// and nu_ij = 2 nu_i nu_j / (nu_i + nu_j):
+///
+///   P_i       = k (rho_i - rho0), times cohesion where negative
+///   drho_i/dt = sum_j m (v_i - v_j) . grad W_ij                                (continuity)
+///   dv_i/dt   = - sum_j m (P_i/rho_i^2 + P_j/rho_j^2) grad W_ij
+///               + (2/m2) sum_j nu_ij (m/rho_ij) (v_j - v_i) W_ij + g           (mean velocity)
+///   dT_i/dt   = (2/m2) kappa sum_j (m/rho_ij) (T_j - T_i) W_ij                 (mean difference)
+///               - (h rho0 / (m c)) (r_i^2 / rho_i) (T_i - T_ext) on the surface, r_i = (m/rho_i)^(1/3)
+///
+/// The factor 2/m2 makes nu and kappa physical (m^2/s) at any spacing; the paper's sums go without it
+/// and change with the smoothing length (Taylor: sum V (f_j - f_i) W -> (m2/2) lap f). Pair terms are
+/// antisymmetric: momentum and heat inside are conserved to rounding. The surface term falls to
+/// h dx^2 (T - T_ext) / (m c) at rest density: h is a heat transfer coefficient.
+///
+/// Ground: surface particles get contacts, and the inner ones that the ground's half-space reaches (the
+/// paper has the surface ones only; a force that comes and goes with the flag pumps energy into the flow).
+/// The half-space beyond the contact's plane joins the sums like a mirror image: the particle's own
+/// pressure and density, twice its approach speed (so that the work of the pressure is what the density
+/// takes up: with the speed alone the ground pumps energy into the flow). Drag of the ground as of a
+/// neighbour at rest. A hard projection at the end of the step keeps every particle at least
+/// spacing / 4 outside. Both ask only about particles that may have come near since their distance was
+/// last measured: a distance is 1-Lipschitz, so last distance minus path is a bound.
+///
+/// Density by continuity grows noise over thousands of steps: a diffusion of density
+///   2 delta (support/2) sqrt(k) sum_j (m/rho_j) (rho_j - rho_i) (x_j - x_i) . grad W_ij / r^2
+/// smooths it (Molteni & Colagrossi 2009, Comput. Phys. Commun. 180, 861-872). And where the density
+/// summed over neighbours and ground, which misses what is beyond a free surface and so is a lower bound,
+/// exceeds it by 25 %, particles have clumped unseen: it is pulled up.
+///
+/// Symplectic Euler kicks velocities with the old density, then moves positions and density with the
+/// new velocities: two passes over the neighbours, stable for sound as Euler is not.
+///
+/// Deterministic: the same bits on any number of threads. Not thread-safe itself.
+class ClassicLava {
+ public:
+  /// Checks the options (spacing, support, density, stiffness, capacities > 0).
+  /// inside: whether a point has ground above or below it; particles that leave are taken out and
+  /// counted. Empty: none leave.
+  ClassicLava(const ClassicOptions& options, std::vector<Vent> vents, std::vector<ContactSource> ground, std::function<bool(const Vec3&)> inside = {});
+
+  /// Adds particles at rest density; ids follow on. All finite (checked).
+  void add(std::span<const Vec3> x, std::span<const Vec3> v, std::span<const Real> temperature);
+
+  /// One step of at most dt_max [s] > 0. A step whose result is not finite, or moves a particle by more
+  /// than half a spacing, is undone and tried with half the size, eight times at most; then
+  /// UnstableError, the state as before the step.
+  StepReport step(Real dt_max);
+
+  /// The largest step the conditions below allow now [s]:
+  ///   courant (support/2) / (sqrt(k) + max|v|),   0.35 m2 / max nu,   0.4 sqrt(dx / max|a|), max_step
+  Real stable_step() const;
+
+  Real time() const { return time_; }
+  std::size_t size() const { return y_.size(); }
+  Real particle_mass() const { return mass_; }
+  Real volume() const { return static_cast<Real>(size()) * mass_ / options_.density; }  ///< at rest density [m^3]
+  Real mass_emitted() const { return static_cast<Real>(emitted_) * mass_; }             ///< by vents and add() [kg]
+  Real mass_left() const { return static_cast<Real>(left_) * mass_; }                   ///< over the ground's edge [kg]
+  const LavaState& state() const { return y_; }
+  const ClassicOptions& options() const { return options_; }
+  /// Views, valid until the next step. crust: 0 at the hot end of the viscosity law, 1 at the cold.
+  geometry::Points points() const;
+  /// dv/dt and the rest at the current state, for tests and studies.
+  const LavaState& rates();
+  std::span<const std::uint8_t> surface() const { return surface_; }
+  /// Bytes held by particles, grid and lists.
+  std::size_t memory() const;
+
+  void add_to(StateHash& hash) const;
+  void save(StateWriter& out) const;
+  /// Throws InputError when the bytes are of another version or cut short.
+  void load(StateReader& in);
+
+ private:
+  static constexpr Index kFree = ~Index{0};
+  struct Site {
+    Vec3 at, up;  // on the ground, and its normal there
+    Index vent;
+    Real share;  // of the vent's volume that makes one particle come out here [m^3]
+    Real phase;  // 0..1: how far its first particle is on its way
+  };
+  void place_sites();
+  std::size_t emit(Real t0, Real t1);
+  void born(const Vec3& x, const Vec3& v, Real temperature);
+  void carry(Real dt);  // sets the speed of the particles that vents carry
+  void keep(const std::vector<Index>& which);  // drops all other particles, in this order
+  void sort_particles();
+  void find_neighbors(std::span<const Vec3> x);
+  void find_contacts();
+  /// The solver as the integrator sees it.
+  struct System;
+  void compute_rates(const LavaState& y, LavaState& k, bool velocities, bool positions);
+  template <bool kVelocities, bool kPositions, class Kernel>
+  void accumulate(const Kernel& kernel, const LavaState& y, LavaState& k);
+  std::size_t leave_ground_behind();  // hard projection; drops what left, returns how many
+  bool acceptable() const;
+  void renew_rest();
+  template <class Self, class Archive>
+  static void archive(Self& self, Archive& io);  // save and load: one list, one order
+
+  ClassicOptions options_;
+  std::vector<Vent> vents_;
+  std::vector<ContactSource> ground_;
+  std::function<bool(const Vec3&)> inside_;
+  std::vector<Site> sites_;
+  Real mass_, support_;
+  HalfSpaceTable half_space_;        // of the kernel
+  CubicSpline density_kernel_;       // of the summed density: exact to 0.03 % on a lattice at support 2
+  HalfSpaceTable density_half_space_;
+
+  // The state, all of it saved.
+  LavaState y_;
+  std::vector<std::uint64_t> id_;
+  std::vector<Real> birth_;         // [s]
+  std::vector<Index> site_;         // the vent's site that carries the particle; kFree: none
+  std::vector<Real> number_;        // which of that site's particles it is
+  std::vector<Vec3> rest_, rest2_;
+  std::vector<std::uint8_t> surface_;
+  std::vector<Vec3> outward_;
+  std::vector<Real> ground_bound_;  // [m]: the ground is not nearer than this
+  Real time_ = 0;
+  Real rest_born_ = 0, rest2_born_ = 0;
+  std::uint64_t next_id_ = 0, emitted_ = 0, left_ = 0, steps_ = 0;
+  Real max_acceleration_ = 0;  // of the last step: the next one's size depends on it
+
+  // Derived at each evaluation; kept for their memory.
+  struct Packed {
+    Vec3 x;
+    Real p_over_rho2;
+    Vec3 v;
+    Real nu, T, rho;
+  };
+  ColumnGrid grid_;
+  Neighbors neighbors_;
+  const Vec3* neighbors_of_ = nullptr;  // positions they were found for; null: none that still stand
+  std::vector<Packed> packed_;
+  std::vector<geometry::Contact> contacts_;        // sources one after another, each over contact_of_
+  std::vector<Index> contact_of_;                  // particles that have contacts, rising
+  std::vector<Index> contact_index_;               // particle -> place in contact_of_, or ~0
+  std::vector<Vec3> query_;
+  LavaState before_;
+  StepStorage<LavaState> storage_;
+  mutable std::vector<Real> radius_, crust_, age_;  // what points() shows
+};
+
+}  // namespace effuse::flow::sph
