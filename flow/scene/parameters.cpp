@@ -69,12 +69,17 @@ std::string joined(const std::string& path, const std::string& key) { return pat
 /// The value as it stands in the file, for messages; long text is cut.
 std::string shown(const Node& node) {
   switch (node.kind) {
-    case Node::Kind::kText: return node.text.size() > 60 ? fmt::format("'{}...'", node.text.substr(0, 57)) : fmt::format("'{}'", node.text);
-    case Node::Kind::kInteger: return fmt::format("{}", node.integer);
-    case Node::Kind::kReal: return fmt::format("{}", node.real);
-    case Node::Kind::kFlag: return node.flag ? "true" : "false";
+    case Node::Kind::kText:
+      return node.text.size() > 60 ? fmt::format("'{}...'", node.text.substr(0, 57)) : fmt::format("'{}'", node.text);
+    case Node::Kind::kInteger:
+      return fmt::format("{}", node.integer);
+    case Node::Kind::kReal:
+      return fmt::format("{}", node.real);
+    case Node::Kind::kFlag:
+      return node.flag ? "true" : "false";
     case Node::Kind::kTable:
-    case Node::Kind::kArray: break;
+    case Node::Kind::kArray:
+      break;
   }
   return kind_name(node.kind);
 }
@@ -103,10 +108,17 @@ bool inside(Real value, const Parameters::Range& range) {
 Real number_of(const Node& node, std::string_view unit) {
   Real value = 0;
   switch (node.kind) {
-    case Node::Kind::kInteger: value = static_cast<Real>(node.integer); break;
-    case Node::Kind::kReal: value = node.real; break;
-    case Node::Kind::kText: value = parse_quantity(node.text, unit); break;
-    default: throw std::invalid_argument(fmt::format("found {}, wanted {}", shown(node), wanted_number(unit)));
+    case Node::Kind::kInteger:
+      value = static_cast<Real>(node.integer);
+      break;
+    case Node::Kind::kReal:
+      value = node.real;
+      break;
+    case Node::Kind::kText:
+      value = parse_quantity(node.text, unit);
+      break;
+    default:
+      throw std::invalid_argument(fmt::format("found {}, wanted {}", shown(node), wanted_number(unit)));
   }
   if (!std::isfinite(value)) throw std::invalid_argument(fmt::format("{} is not a finite number", shown(node)));
   return value;
@@ -176,8 +188,7 @@ void Parameters::fault(const std::string& key, const std::string& message) {
   shared_->faults.push_back({place(key), name.empty() ? message : name + ": " + message});
 }
 
-Real Parameters::number(const std::string& key, std::string_view unit, std::optional<Real> fallback, Range range,
-                        std::string_view what) {
+Real Parameters::number(const std::string& key, std::string_view unit, std::optional<Real> fallback, Range range, std::string_view what) {
   Table::Entry& entry = table_->entry(key);
   shared_->document(joined(table_->doc_path, key), plain(unit) ? "" : std::string(unit),
                     fallback ? format_quantity(*fallback, plain(unit) ? "" : unit) : "", what);
@@ -270,8 +281,7 @@ std::string Parameters::text(const std::string& key, std::optional<std::string> 
   return value;
 }
 
-std::size_t Parameters::choice(const std::string& key, const std::vector<std::string>& names, std::size_t fallback,
-                               std::string_view what) {
+std::size_t Parameters::choice(const std::string& key, const std::vector<std::string>& names, std::size_t fallback, std::string_view what) {
   CHECK_LT(fallback, names.size());
   Table::Entry& entry = table_->entry(key);
   shared_->document(joined(table_->doc_path, key), "choice: " + list(names, " | "), names[fallback], what);
@@ -450,8 +460,7 @@ std::vector<Parameters> Parameters::tables(const std::string& key, std::string_v
           child->node = &item;
           entry.tables.push_back(std::move(child));
         } else {
-          shared_->faults.push_back(
-              {item.place, fmt::format("{0}: found {1}, wanted a table: [[{0}]]", joined(path_, key), shown(item))});
+          shared_->faults.push_back({item.place, fmt::format("{0}: found {1}, wanted a table: [[{0}]]", joined(path_, key), shown(item))});
         }
       }
     }

@@ -17,7 +17,7 @@ namespace {
 constexpr Index kNone = ~Index{0};
 constexpr int kSortInterval = 16;    // steps between two orderings of the particles in memory
 constexpr int kMaxRetries = 8;
-constexpr Real kClumped = 1.25;      // a summed density this many times the continuity density is a clump
+constexpr Real kTorn = 0.9;          // of the rest density
 constexpr Real kClearance = 0.25;    // a particle stays this many spacings off the ground
 constexpr std::string_view kModel = "classic 1";  // of a checkpoint: changes with what is saved
 constexpr std::uint64_t kPhaseStream = 1;  // random numbers: when a vent's sites start
@@ -244,7 +244,7 @@ void ClassicLava::accumulate(const Kernel& kernel, const LavaState& y, LavaState
   const Real kappa = options_.diffusivity * mean_to_laplacian;
   const Real sound = std::sqrt(stiffness);
   const Real diffuse_per_mass = options_.density_diffusion * support_ * sound;
-  const Real unclump = 0.5 * sound / options_.spacing;
+  const Real relax = options_.density_relaxation * sound / options_.spacing;
   const Real exchange = rho0 / (m * options_.heat_capacity);
   k.x.resize(n);
   k.v.resize(n);
@@ -288,7 +288,7 @@ void ClassicLava::accumulate(const Kernel& kernel, const LavaState& y, LavaState
 
     bool grounded = false;
     const Real r2_over_rho = kVelocities && surface_[i] ? std::pow(m / a.rho, 2.0 / 3.0) / a.rho : 0;  // 0: exchanges nothing
-    if (contact_index_[i] != kNone) {
+    if (contact_index_[i] != kNone && site_[i] == kFree) {  // under a vent there is no floor
       for (std::size_t s = 0; s < ground_.size(); ++s) {
         const geometry::Contact& c = contacts_[s * contact_of_.size() + contact_index_[i]];
         if (!c.any()) continue;
@@ -313,9 +313,10 @@ void ClassicLava::accumulate(const Kernel& kernel, const LavaState& y, LavaState
       const bool covered = grounded && outward_[i].dot(contacts_[contact_index_[i]].normal) < -0.3;
       if (!covered) dT -= options_.air_exchange * exchange * r2_over_rho * (a.T - options_.air_temperature);
     }
-    // The sum misses what is beyond a free surface, so the true density is no lower; disorder alone
-    // lifts it by less than the margin.
-    drho += unclump * std::max(0.0, summed - kClumped * a.rho);
+    // Towards the summed density; at a free surface, where the sum lacks what is not there, towards
+    // rest density: no pressure. Lava tears rather than thins: no density falls below kTorn.
+    drho += relax * (std::max(summed, rho0) - a.rho);
+    if (a.rho < kTorn * rho0) drho = std::max(drho, 0.0);
 
     const bool held = site_[i] != kFree;
     if constexpr (kPositions) {

@@ -41,6 +41,7 @@ struct ClassicOptions {
   Real stiffness = 900;       ///< k in P = k (rho - rho0) [m^2/s^2]; sqrt(k) is the speed of sound
   Real cohesion = 0.3;        ///< of negative pressure, 1: as the state equation says; less clumps less
   Real density_diffusion = 0.1;  ///< delta of Molteni & Colagrossi 2009; 0: the paper's continuity equation alone
+  Real density_relaxation = 0.02;  ///< share of sqrt(k) / dx at which the density goes to the summed one; 0: the paper's
   ExponentialViscosity viscosity;
   Real ground_friction = 1;   ///< of the viscous drag of the ground: 1 no slip, 0 free slip
   Real diffusivity = 1e-6;    ///< heat inside [m^2/s]
@@ -106,9 +107,9 @@ struct StepReport {
 ///
 /// Density by continuity grows noise over thousands of steps: a diffusion of density
 ///   2 delta (support/2) sqrt(k) sum_j (m/rho_j) (rho_j - rho_i) (x_j - x_i) . grad W_ij / r^2
-/// smooths it (Molteni & Colagrossi 2009, Comput. Phys. Commun. 180, 861-872). And where the density
-/// summed over neighbours and ground, which misses what is beyond a free surface and so is a lower bound,
-/// exceeds it by 25 %, particles have clumped unseen: it is pulled up.
+/// smooths it (Molteni & Colagrossi 2009, Comput. Phys. Commun. 180, 861-872). And it drifts: slowly it is
+/// pulled towards  max(rho0, summed over neighbours and ground); the sum reads low at a free surface, where
+/// rest density, no pressure, is what should be. Below 0.9 rho0 lava tears: the density falls no further.
 ///
 /// Symplectic Euler kicks velocities with the old density, then moves positions and density with the
 /// new velocities: two passes over the neighbours, stable for sound as Euler is not.

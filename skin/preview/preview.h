@@ -22,23 +22,44 @@ struct Camera {
   Real field_of_view = 0.7;    ///< vertical [rad]
 };
 
+/// The nearest camera that holds the whole box, looking at it from azimuth (counter-clockwise from +x, where the eye
+/// is) and elevation above the horizon [rad, within +-1.5]. aspect: width / height; margin: share of the picture's
+/// height and width left free around the box. An empty box is a metre at the origin.
+Camera frame_camera(const Box3& box, Real azimuth, Real elevation, Real aspect = 16.0 / 9, Real margin = 0.06, Real field_of_view = 0.7);
+
 struct PreviewOptions {
   int width = 960, height = 540;
   Camera camera;
-  Vec3 sun_direction = Vec3(-0.5, -0.4, 0.55);  ///< towards the sun
-  Real sun = 3.0, sky = 1.0;                    ///< strengths
-  int samples = 4;                              ///< rays a pixel
+  /// Towards the sun. The sky goes with it: low is dusk (warm light, dark sky, where a glow reads best; the default),
+  /// half a radian and higher is day, below the horizon is night.
+  Vec3 sun_direction = Vec3(-0.80, -0.45, 0.22);
+  Real sun = 3.0, sky = 1.0;  ///< strengths
+  int samples = 4;            ///< rays a pixel
   Real exposure = 1.0;
+  Real haze = 1.0;         ///< 0: none; 1: the horizon fades at some ten times the terrain's size
+  Real bloom = 1.0;        ///< light that spills round bright pixels; 0: none
+  Real glow_light = 1.0;   ///< how much the lava lights the ground around it; 0: not
+  std::uint64_t seed = 0;  ///< of the sample positions; the same for all frames, so that still ground does not shimmer
 };
 
 /// Ray-traced pictures (Embree): terrain shaded by slope and altitude under sun and sky, lava by its "color" and "glow".
 /// The terrain's tree is built once, the lava's for each frame. Same bits on any number of threads.
+///
+/// The ground is drawn as it is (the lava rests on it): only its normals are smoothed, and given grass, scree and rock
+/// by a procedural texture. Beyond its border an apron of made-up land runs down to the lowest border height and out
+/// into the haze. Emission lights the ground through a coarse grid of summed patches of lava, without noise.
+/// Lava without "color" is dark rock, without "glow" does not shine. Either mesh may be empty.
+/// Costs 0.55 s of processor time at 960 x 540, 4 samples, 10 k triangles of ground, 90 k of lava; all but
+/// the lava's tree (0.02 s) runs on every thread.
 class Preview {
  public:
+  /// Throws InputError when the terrain is not well formed (index out of range, position not finite).
   explicit Preview(const geometry::TriMesh& terrain);
   ~Preview();
   Preview(const Preview&) = delete;
   Preview& operator=(const Preview&) = delete;
+  /// Linear light after exposure and bloom. Throws InputError for lava that is not well formed, or options out of
+  /// range: sizes 1..16384, samples 1..1024, a field of view within (0, pi), an eye apart from its target.
   Image render(const geometry::TriMesh& lava, const PreviewOptions& options) const;
 
  private:
@@ -48,7 +69,12 @@ class Preview {
 
 /// sRGB 8 bit PNG after a filmic curve; whole or absent.
 void write_png(const std::filesystem::path& file, const Image& image);
-/// count pictures of the folder, evenly spread in time, side by side; each with its label burnt in.
-void write_contact_sheet(const std::filesystem::path& file, const std::vector<std::filesystem::path>& pictures, const std::vector<std::string>& labels, int columns);
+/// Pictures side by side, row by row, each with its label burnt in; whole or absent.
+///   pictures  PNG files, at least one; each is scaled down (never up) to a common width of at most 480 pixels
+///   labels    as many as pictures (checked); letters show as capitals, what the font does not have as '?'
+///   columns   > 0 (checked)
+/// Throws InputError when a picture is missing or broken.
+void write_contact_sheet(const std::filesystem::path& file, const std::vector<std::filesystem::path>& pictures,
+                         const std::vector<std::string>& labels, int columns);
 
 }  // namespace effuse::skin

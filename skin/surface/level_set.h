@@ -17,9 +17,20 @@ struct LevelSetOptions {
   Real voxel = 0;         ///< [m]; 0: spacing / 2
   Real influence = 2;     ///< a particle is felt within influence * spacing
   Real radius = 0.6;      ///< of the sphere round a lone particle, in spacings (about (3/4pi)^(1/3) = 0.62 for equal volume)
-  int smoothing = 2;      ///< passes of mean-curvature flow
-  Real drop_volume = 0;   ///< closed pieces smaller than this many particles' volume are dropped
+  int smoothing = 2;      ///< passes of mean-curvature flow, each as far as one at voxel = spacing / 2 whatever the voxel
+  Real sink = 0;          ///< [m] how far under the ground the surface ends; 0: one and a half voxels
+  Real drop_volume = 0;   ///< closed pieces and closed bubbles smaller than this many particles' volume are dropped, filled
   bool match_volume = true;  ///< shift the surface so that it encloses the particles' volume above ground
+};
+
+/// What building a level set did.
+struct LevelSetReport {
+  std::size_t particles = 0;
+  Real volume = 0;        ///< [m^3] enclosed, above ground
+  Real target = 0;        ///< [m^3] what it was to be; 0: nothing asked for
+  Real shift = 0;         ///< [m] by which the surface was moved out, within +-0.5 spacing
+  Real residual = 0;      ///< volume / target - 1; 0 without target. Not small: the bound of the shift stood in the way
+  std::size_t dropped_pieces = 0, filled_bubbles = 0;
 };
 
 /// The lava's surface as a narrow-band level set, with fields beside it. Opaque: OpenVDB stays inside.
@@ -35,34 +46,49 @@ class LevelSet {
   const Impl& impl() const { return *impl_; }
   bool empty() const;
   Real voxel() const;
+  /// Voxels within two voxels of the surface.
   std::size_t active_voxels() const;
+  const LevelSetReport& report() const;
 
  private:
   std::unique_ptr<Impl> impl_;
 };
 
 /// Level set round the points (Zhu & Bridson 2005): phi(x) = |x - xbar| - rbar, xbar and rbar averages of the
-/// particles' positions and radii with weights (1 - (|x - x_i|/R)^2)^3, R = influence * spacing; smoothed,
-/// then cut at the ground: below it the surface follows the ground's footprint straight along the normal and
-/// ends `sink` under the ground, so that no gap shows and nothing flickers. Without terrain nothing is cut.
+/// particles' positions and radii with weights (1 - (|x - x_i|/R)^2)^3, R = influence * spacing. Two repairs: between
+/// particles that do not touch the average lies in empty space, so phi >= 3 (d - spacing), d the distance of the nearest
+/// particle (no floating blobs, no webs; a sheet one particle thick stays whole up to 1.4 spacings between its
+/// particles); and smoothing acts only where a particle has neighbours, so that drops do not shrink away.
 ///
-/// Temperature, velocity and crust are carried by the same weights. Deterministic: the same bits on any
-/// number of threads. Empty points: an empty level set.
+/// Then cut at the ground: below half a spacing over it the field is that of the point lifted along the ground's normal
+/// to half a spacing, so that lava stands straight on the ground; and it ends `sink` under the ground, so that no gap
+/// shows and nothing flickers. Without terrain nothing is cut. Ground distance is sampled every second voxel.
+///
+/// All particles are needed, the inner ones too: where there are none it is hollow. Deterministic: the same bits on any
+/// number of threads, whatever the order of the points. Empty points: an empty level set.
 ///   volume  particles' total volume [m^3], used when options.match_volume
+/// Throws InputError for positions or radii that are not finite, a radius <= 0, or particles so far apart that the voxels
+/// cannot be numbered (a million in a row).
+/// Source: Zhu & Bridson 2005, ACM Trans. Graph. 24, 965-972.
 LevelSet build_level_set(const geometry::Points& points, Real volume, const geometry::Terrain* terrain, const LevelSetOptions& options);
 
 /// Watertight triangles of the zero level (OpenVDB volumeToMesh, winding put right), closed, oriented and
-/// manifold; attributes "temperature", "velocity", "crust" sampled at the vertices; normals from the gradient.
+/// manifold: where pieces touch in an edge or a point, each gets vertices of its own. Attributes "temperature",
+/// "velocity", "crust" and, when the points had them, "age", "rest", "rest2" (width 3), by the surface's weights
+/// at the vertices; normals from the gradient.
 geometry::TriMesh mesh_level_set(const LevelSet& surface);
 
 /// Volume between the surface and the ground above it [m^3] (below-ground part left out).
 Real volume_above_ground(const LevelSet& surface, const geometry::Terrain* terrain);
 
-/// VDB with "surface" (GRID_LEVEL_SET), "density" (fog), "temperature", "velocity", metadata as strings; whole or
-/// absent. A full disk is noticed (OpenVDB does not) and thrown as ResourceError.
+/// VDB with "surface" (GRID_LEVEL_SET, distances [m], band of three voxels), "density" (fog: 1 inside, 0 outside, one voxel
+/// between), and when the points had them "temperature" and "velocity" inside and up to two voxels outside; metadata as
+/// strings of the file. Half floats, blosc. Whole or absent: the file's table of contents is walked before it gets its name, so that a
+/// full disk is noticed (OpenVDB does not) and thrown as ResourceError. Empty level set: the grids, empty.
 void write_vdb(const std::filesystem::path& file, const LevelSet& surface, const std::vector<std::pair<std::string, std::string>>& metadata);
 
-/// Names, classes, active voxels and bounds of the grids of a VDB file, one line each. Throws InputError.
+/// Names, classes, active voxels and bounds of the grids of a VDB file, one line each, from
+/// the headers: fast whatever the size. A truncated file is noticed. Throws InputError.
 std::vector<std::string> describe_vdb(const std::filesystem::path& file);
 
 }  // namespace effuse::skin

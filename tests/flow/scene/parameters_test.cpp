@@ -104,20 +104,21 @@ TEST(Parameters, AWrongDimensionIsAFaultAtTheValueThatNamesTheKey) {
 
 TEST(Parameters, EveryKindOfWrongValueIsOneFault) {
   Scene scene;
-  scene.add("a", flag(true))              // not a number
-      .add("b", real(-1))                 // below the range
-      .add("c", real(0))                  // the open end itself
-      .add("d", real(std::nan("")))       // not finite
-      .add("e", real(INFINITY))           // not finite
-      .add("f", text("fast"))             // no number at all
-      .add("g", real(2.5))                // not whole
-      .add("h", integer(11))              // out of range
-      .add("i", text("yes"))              // not a flag
-      .add("j", integer(3))               // not text
-      .add("k", text("modren"))           // no such choice
+  scene
+      .add("a", flag(true))                     // not a number
+      .add("b", real(-1))                       // below the range
+      .add("c", real(0))                        // the open end itself
+      .add("d", real(std::nan("")))             // not finite
+      .add("e", real(INFINITY))                 // not finite
+      .add("f", text("fast"))                   // no number at all
+      .add("g", real(2.5))                      // not whole
+      .add("h", integer(11))                    // out of range
+      .add("i", text("yes"))                    // not a flag
+      .add("j", integer(3))                     // not text
+      .add("k", text("modren"))                 // no such choice
       .add("l", array({text("x"), text("x")}))  // twice
       .add("m", array({real(1), real(2)}))      // two for three
-      .add("n", real(5));                 // a number for a table
+      .add("n", real(5));                       // a number for a table
   Parameters p(scene.root);
   p.number("a", "m", 1, {}, "");
   p.number("b", "m", 1, Parameters::not_negative(), "");

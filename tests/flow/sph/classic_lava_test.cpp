@@ -43,7 +43,7 @@ ClassicOptions quiet() {
   ClassicOptions o;
   o.gravity.setZero();
   o.air_exchange = o.ground_exchange = 0;
-  o.density_diffusion = 0;
+  o.density_diffusion = o.density_relaxation = 0;
   o.cohesion = 1;
   return o;
 }

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "flow/scene/parameters.h"
+#include "geometry/base/hash.h"
+#include "geometry/base/state_io.h"
+#include "geometry/mesh/points.h"
+#include "geometry/terrain/terrain.h"
+
+namespace effuse::flow {
+
+/// What effects live in.
+struct World {
+  const geometry::Terrain* terrain = nullptr;
+  std::uint64_t seed = 1;
+};
+
+/// What an effect is expected to cost: for `effuse check`.
+struct Estimate {
+  double particles = 0;  ///< at the end
+  double bytes = 0;      ///< of memory, at the end
+  double steps = 0;      ///< in all, at the largest stable size
+  double seconds = 0;    ///< of two cores; a rough figure
+};
+
+/// Something that must be stepped, as the run loop sees it: one adapter an effect, over a solver that
+/// knows nothing of scenes. Built only when a scene names it.
+class Effect {
+ public:
+  virtual ~Effect() = default;
+  virtual std::string_view name() const = 0;
+  /// Time reached [s].
+  virtual Real time() const = 0;
+  /// One step of the effect's own choosing, not beyond t_end [s]. Throws UnstableError with the state as
+  /// before the step.
+  virtual void step(Real t_end) = 0;
+  /// Particles to skin, and their volume [m^3]; none by default.
+  virtual geometry::Points points() const { return {}; }
+  virtual Real volume() const { return 0; }
+  /// Spacing of the particles [m], 0 without any.
+  virtual Real spacing() const { return 0; }
+  virtual std::size_t memory() const = 0;  ///< bytes held
+  virtual void add_to(StateHash& hash) const = 0;
+  virtual void save(StateWriter& out) const = 0;
+  virtual void load(StateReader& in) = 0;
+  /// Figures for the run's report: name and value, in a fixed order.
+  virtual std::vector<std::pair<std::string, double>> figures() const = 0;
+  /// One line for the progress display: "8,214 particles, dt 12 ms".
+  virtual std::string status() const = 0;
+};
+
+/// An effect as a scene describes it, not yet built.
+struct EffectPlan {
+  std::string name;
+  Estimate estimate;
+  std::function<std::unique_ptr<Effect>(const World&)> build;
+};
+
+/// An effect there is: its name is the name of its table in a scene.
+struct EffectKind {
+  std::string name;
+  std::string what;
+  /// Reads the table; faults stay in parameters. duration: simulated time of the scene [s].
+  EffectPlan (*read)(Parameters& parameters, Real duration);
+};
+
+}  // namespace effuse::flow

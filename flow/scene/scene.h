@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "flow/scene/effect.h"
+#include "flow/scene/parameters.h"
+
+namespace effuse::flow {
+
+/// What a scene says, but for the tables that the skin and the writers read. A value.
+struct Scene {
+  std::string name;
+  std::uint64_t seed = 1;
+  int frames = 0;
+  Real fps = 24;
+  Real time_scale = 1;          ///< simulated seconds a second of film
+  std::string terrain_file;     ///< as written; relative to the scene file
+  Place terrain_place;
+  std::string terrain_crs;      ///< "": as the file says
+  Real ground_temperature = 0;  ///< [K]
+  std::vector<EffectPlan> effects;
+
+  /// Frame n = 1, 2, ... shows this moment [s].
+  Real frame_time(int n) const { return n * time_scale / fps; }
+};
+
+/// Reads the tables [film], [terrain] and one for each effect of kinds that the scene names. Faults stay
+/// in root: the caller reads on and calls root.finish().
+Scene read_scene(Parameters& root, std::span<const EffectKind> kinds);
+
+}  // namespace effuse::flow

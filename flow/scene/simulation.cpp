@@ -1,0 +1,114 @@
+#include "flow/scene/simulation.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "geometry/base/check.h"
+#include "geometry/base/error.h"
+#include "geometry/base/files.h"
+#include "geometry/base/zones.h"
+
+namespace effuse::flow {
+
+namespace fs = std::filesystem;
+
+namespace {
+constexpr std::string_view kMagic = "effuse checkpoint 1";
+constexpr std::size_t kKeep = 2;  // one to fall back on should the newest be damaged
+
+std::vector<fs::path> checkpoints(const fs::path& folder) {
+  std::vector<fs::path> found;
+  std::error_code ignored;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder / "checkpoints", ignored)) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with("checkpoint.") && name.ends_with(".state") && name.find(".part") == std::string::npos) found.push_back(entry.path());
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+}  // namespace
+
+Simulation::Simulation(const Scene& scene, const World& world) : scene_(&scene) {
+  for (const EffectPlan& plan : scene.effects) effects_.push_back(plan.build(world));
+}
+
+bool Simulation::advance(const std::function<bool()>& keep_going) {
+  const Real end = scene_->frame_time(frame_ + 1);
+  for (const auto& effect : effects_) {
+    while (effect->time() < end) {
+      if (!keep_going()) return false;
+      effect->step(end);
+    }
+  }
+  ++frame_;
+  return true;
+}
+
+std::string Simulation::state_hash() const {
+  StateHash hash;
+  hash.add(frame_);
+  for (const auto& effect : effects_) {
+    hash.add(effect->name());
+    effect->add_to(hash);
+  }
+  return hash.hex();
+}
+
+std::size_t Simulation::memory() const {
+  std::size_t bytes = 0;
+  for (const auto& effect : effects_) bytes += effect->memory();
+  return bytes;
+}
+
+std::string Simulation::checkpoint(const std::string& scene_key) const {
+  StateWriter out;
+  out.text("magic", kMagic);
+  out.text("scene", scene_key);
+  out.value("frame", frame_);
+  out.value("effects", effects_.size());
+  for (const auto& effect : effects_) {
+    out.text("effect", effect->name());
+    effect->save(out);
+  }
+  out.text("end", "end");
+  return out.bytes();
+}
+
+void Simulation::restore(std::string_view bytes, const std::string& scene_key, const std::string& file) {
+  StateReader in(bytes, file);
+  std::string text;
+  in.text("magic", text);
+  if (text != kMagic) throw InputError(Place{file}, fmt::format("found '{:.40}', wanted '{}'", text, kMagic));
+  in.text("scene", text);
+  if (text != scene_key) throw InputError(Place{file}, "the scene has changed since this checkpoint was written; start anew in another folder, or put the scene back");
+  int frame = 0;
+  std::size_t count = 0;
+  in.value("frame", frame);
+  in.value("effects", count);
+  if (count != effects_.size()) throw InputError(Place{file}, fmt::format("holds {} effects, the scene has {}", count, effects_.size()));
+  for (const auto& effect : effects_) {
+    in.text("effect", text);
+    if (text != effect->name()) throw InputError(Place{file}, fmt::format("holds effect '{:.40}', wanted '{}'", text, effect->name()));
+    effect->load(in);
+  }
+  in.text("end", text);
+  frame_ = frame;
+}
+
+void write_checkpoint(const fs::path& folder, const Simulation& simulation, const std::string& scene_key) {
+  ZONE("checkpoint");
+  write_file(folder / "checkpoints" / fmt::format("checkpoint.{:04}.state", simulation.frame()), simulation.checkpoint(scene_key));
+  std::vector<fs::path> all = checkpoints(folder);
+  for (std::size_t i = 0; i + kKeep < all.size(); ++i) {
+    std::error_code ignored;
+    fs::remove(all[i], ignored);
+  }
+}
+
+fs::path newest_checkpoint(const fs::path& folder) {
+  const std::vector<fs::path> all = checkpoints(folder);
+  return all.empty() ? fs::path() : all.back();
+}
+
+}  // namespace effuse::flow

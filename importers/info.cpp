@@ -1,0 +1,119 @@
+#include "importers/info.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/base/error.h"
+#include "geometry/mesh/measure.h"
+#include "geometry/mesh/validate.h"
+#include "importers/input_file.h"
+#include "importers/mesh/import_mesh.h"
+#include "importers/scene/scene_file.h"
+#include "importers/terrain/depressions.h"
+#include "importers/terrain/esri_ascii.h"
+#include "importers/terrain/import_terrain.h"
+#include "importers/terrain/projection.h"
+
+namespace effuse::importers {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+using Lines = std::vector<std::string>;
+
+void add_notes(Lines& lines, const Lines& notes) {
+  for (const std::string& note : notes) lines.push_back("note: " + note);
+}
+
+Lines describe_grid(const fs::path& file) {
+  const TerrainImport import = import_terrain(file);
+  const geometry::HeightField& field = *import.terrain.height_field();
+  const geometry::Georeference& georeference = import.terrain.georeference();
+  const Vec2 size(field.spacing().x() * (field.nx() - 1), field.spacing().y() * (field.ny() - 1));
+  Real low = INFINITY, high = -INFINITY;
+  std::size_t holes = 0;
+  for (Real z : field.posts()) {
+    holes += std::isnan(z);
+    low = std::fmin(low, z);
+    high = std::fmax(high, z);
+  }
+
+  Lines lines;
+  lines.push_back(fmt::format("terrain grid: {} x {} posts, {:.6g} x {:.6g} m apart: {:.6g} x {:.6g} m", field.nx(), field.ny(),
+                              field.spacing().x(), field.spacing().y(), size.x(), size.y()));
+  lines.push_back(fmt::format("heights: {:.6g} to {:.6g} m", low, high));
+  lines.push_back(holes == 0 ? std::string("holes: none")
+                             : fmt::format("holes: {} posts without data ({:.1f} %)", holes,
+                                           100.0 * static_cast<double>(holes) / static_cast<double>(field.posts().size())));
+  lines.push_back("coordinate system: " + (georeference.crs.empty() ? std::string("unknown") : projection_title(georeference.crs)));
+  lines.push_back(
+      fmt::format("local origin: {:.0f}, {:.0f}, {:.0f}", georeference.origin.x(), georeference.origin.y(), georeference.origin.z()));
+
+  const std::vector<Depression> depressions = closed_depressions(field);
+  if (depressions.empty()) {
+    lines.push_back("closed depressions: none");
+  } else {
+    lines.push_back(fmt::format("closed depressions: {}", depressions.size()));
+    for (std::size_t d = 0; d < std::min<std::size_t>(3, depressions.size()); ++d) {
+      const Depression& found = depressions[d];
+      lines.push_back(
+          fmt::format("  {:.6g} m deep, floor {:.6g} m, spills at {:.6g} m, lowest at local {:.6g}, {:.6g}; {} posts, {:.3g} m3",
+                      found.depth(), found.floor, found.spill, found.lowest.x(), found.lowest.y(), found.posts, found.volume));
+    }
+  }
+  add_notes(lines, import.notes);
+  return lines;
+}
+
+Lines describe_mesh(const fs::path& file) {
+  const MeshImport import = import_mesh(file);
+  const geometry::MeshReport report = geometry::validate(import.mesh);
+  const Box3 box = geometry::bounds(import.mesh);
+  Lines lines;
+  lines.push_back("mesh: " + to_string(report));
+  lines.push_back(fmt::format("box: {:.6g} .. {:.6g}, {:.6g} .. {:.6g}, {:.6g} .. {:.6g} m", box.min().x(), box.max().x(), box.min().y(),
+                              box.max().y(), box.min().z(), box.max().z()));
+  lines.push_back(fmt::format("size: {:.6g} x {:.6g} x {:.6g} m, area {:.6g} m2{}", box.sizes().x(), box.sizes().y(), box.sizes().z(),
+                              geometry::surface_area(import.mesh),
+                              report.solid() ? fmt::format(", volume {:.6g} m3", geometry::signed_volume(import.mesh)) : ""));
+  std::string attributes = import.mesh.normals.empty() ? "" : "normals";
+  for (const auto& [name, attribute] : import.mesh.attributes)
+    attributes += fmt::format("{}{}{}", attributes.empty() ? "" : ", ", printable(name, 40),
+                              attribute.width > 1 ? fmt::format(" ({})", attribute.width) : "");
+  lines.push_back("attributes: " + (attributes.empty() ? std::string("none") : attributes));
+  add_notes(lines, import.notes);
+  return lines;
+}
+
+Lines describe_scene(const fs::path& file) {
+  const flow::Node scene = read_scene_file(file);
+  Lines lines;
+  std::string name, effects, tables;
+  for (const char* key : {"name", "title"})
+    if (const flow::Node* node = scene.find(key); node && node->kind == flow::Node::Kind::kText && name.empty()) name = node->text;
+  if (const flow::Node* node = scene.find("effects"))
+    for (const flow::Node& item : node->items)
+      if (item.kind == flow::Node::Kind::kText) effects += (effects.empty() ? "" : ", ") + item.text;
+  for (const auto& [key, node] : scene.entries)
+    if (node.kind == flow::Node::Kind::kTable ||
+        (node.kind == flow::Node::Kind::kArray && !node.items.empty() && node.items.front().kind == flow::Node::Kind::kTable))
+      tables += (tables.empty() ? "" : ", ") + key;
+  lines.push_back("scene: " + (name.empty() ? file.stem().string() : name));
+  if (!effects.empty()) lines.push_back("effects: " + effects);
+  lines.push_back("tables: " + (tables.empty() ? std::string("none") : tables));
+  return lines;
+}
+
+}  // namespace
+
+std::vector<std::string> describe_file(const fs::path& file) {
+  const std::string extension = lower_extension(file);
+  if (extension == ".toml") return describe_scene(file);
+  const bool grid = extension == ".asc" || looks_like_esri_ascii(read_input(file, std::uint64_t{8} << 30, "a file"));
+  return grid ? describe_grid(file) : describe_mesh(file);
+}
+
+}  // namespace effuse::importers

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+/// What every reader of files asks first, and how it quotes what it found.
+namespace effuse::importers {
+
+/// The bytes of a file somebody named. Throws InputError when it is missing, a folder, a device, not
+/// readable, empty, or larger than limit bytes (what: "a scene", for that message).
+std::string read_input(const std::filesystem::path& file, std::uint64_t limit, std::string_view what);
+
+/// "'12,5'": a piece of a file in quotes, cut to 40 characters, what cannot be printed as '?'.
+std::string quote(std::string_view text);
+
+/// The same without quotes and up to 200 characters: messages of packages, which may quote binary files.
+std::string printable(std::string_view text, std::size_t limit = 200);
+
+/// ASCII lower case.
+std::string lower(std::string_view text);
+
+/// ".asc" for "a/B.ASC".
+std::string lower_extension(const std::filesystem::path& file);
+
+/// The one number text holds, in C's notation: digits, point, exponent, sign; also nan and inf.
+/// false when it is anything else, has something after it, or is too large for a double.
+bool parse_number(std::string_view text, double& value);
+
+}  // namespace effuse::importers

@@ -1,0 +1,144 @@
+#include "importers/terrain/dem_importer.h"
+
+#include <assimp/BaseImporter.h>
+#include <assimp/importerdesc.h>
+#include <assimp/scene.h>
+
+#include <algorithm>
+#include <assimp/IOStream.hpp>
+#include <assimp/IOSystem.hpp>
+#include <assimp/Importer.hpp>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "geometry/base/error.h"
+#include "importers/terrain/esri_ascii.h"
+
+namespace effuse::importers {
+
+namespace {
+
+std::string read_stream(Assimp::IOSystem& files, const std::string& name, std::size_t limit) {
+  const std::unique_ptr<Assimp::IOStream, void (*)(Assimp::IOStream*)> stream(files.Open(name, "rb"),
+                                                                              [](Assimp::IOStream* s) { delete s; });
+  if (!stream) throw InputError({name}, "cannot be opened");
+  std::string bytes(std::min(stream->FileSize(), limit), '\0');
+  if (!bytes.empty() && stream->Read(bytes.data(), 1, bytes.size()) != bytes.size()) throw InputError({name}, "cannot be read to its end");
+  return bytes;
+}
+
+/// Every stride-th post and the last of each row and column, so that the whole area stays covered.
+std::vector<int> chosen_posts(int n, int stride) {
+  std::vector<int> posts;
+  for (int i = 0; i < n - 1; i += stride) posts.push_back(i);
+  posts.push_back(n - 1);
+  return posts;
+}
+
+/// The grid as assimp's mesh; without faces when the chosen posts have too many holes.
+std::unique_ptr<aiMesh> make_mesh(const DemGrid& grid, int stride) {
+  const std::vector<int> columns = chosen_posts(grid.nx, stride), rows = chosen_posts(grid.ny, stride);
+  const auto height = [&](std::size_t c, std::size_t r) {
+    return grid.z[static_cast<std::size_t>(rows[r]) * static_cast<std::size_t>(grid.nx) + static_cast<std::size_t>(columns[c])];
+  };
+  constexpr unsigned kNone = ~0u;
+  std::vector<unsigned> number(columns.size() * rows.size(), kNone);
+  std::vector<aiVector3D> positions;
+  std::vector<std::array<unsigned, 3>> triangles;
+  const auto vertex = [&](std::size_t c, std::size_t r) {
+    unsigned& known = number[r * columns.size() + c];
+    if (known == kNone) {
+      known = static_cast<unsigned>(positions.size());
+      positions.emplace_back(static_cast<float>(columns[c] * grid.spacing.x()), static_cast<float>(rows[r] * grid.spacing.y()),
+                             static_cast<float>(height(c, r)));
+    }
+    return known;
+  };
+  for (std::size_t r = 0; r + 1 < rows.size(); ++r) {
+    for (std::size_t c = 0; c + 1 < columns.size(); ++c) {
+      if (std::isnan(height(c, r) + height(c + 1, r) + height(c, r + 1) + height(c + 1, r + 1))) continue;
+      const unsigned sw = vertex(c, r), se = vertex(c + 1, r), nw = vertex(c, r + 1), ne = vertex(c + 1, r + 1);
+      triangles.push_back({sw, se, ne});
+      triangles.push_back({sw, ne, nw});
+    }
+  }
+  auto mesh = std::make_unique<aiMesh>();
+  mesh->mName.Set("terrain");
+  mesh->mPrimitiveTypes = aiPrimitiveType_TRIANGLE;
+  mesh->mNumVertices = static_cast<unsigned>(positions.size());
+  mesh->mVertices = new aiVector3D[positions.size()];
+  std::copy(positions.begin(), positions.end(), mesh->mVertices);
+  mesh->mNumFaces = static_cast<unsigned>(triangles.size());
+  mesh->mFaces = new aiFace[triangles.size()];
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    mesh->mFaces[t].mNumIndices = 3;
+    mesh->mFaces[t].mIndices = new unsigned[3]{triangles[t][0], triangles[t][1], triangles[t][2]};
+  }
+  return mesh;
+}
+
+class AscImporter final : public Assimp::BaseImporter {
+ public:
+  explicit AscImporter(std::shared_ptr<DemResult> result) : result_(std::move(result)) {}
+
+  bool CanRead(const std::string& file, Assimp::IOSystem* files, bool check_signature) const override {
+    if (SimpleExtensionCheck(file, "asc")) return true;
+    if (!check_signature || !files) return false;
+    try {
+      return looks_like_esri_ascii(read_stream(*files, file, 512));
+    } catch (const InputError&) {
+      return false;
+    }
+  }
+
+  const aiImporterDesc* GetInfo() const override {
+    static constexpr aiImporterDesc kDescription = {
+        "effuse ESRI ASCII grid importer", "effuse", "", "", aiImporterFlags_SupportTextFlavour, 0, 0, 0, 0, "asc"};
+    return &kDescription;
+  }
+
+  void SetupProperties(const Assimp::Importer* importer) override {
+    stride_ = std::max(1, importer->GetPropertyInteger("EFFUSE_DEM_STRIDE", 1));
+  }
+
+ protected:
+  void InternReadFile(const std::string& file, aiScene* scene, Assimp::IOSystem* files) override {
+    try {
+      DemGrid grid = parse_esri_ascii(read_stream(*files, file, std::string::npos), file);
+      fill(*scene, grid);
+      if (result_) result_->grid = std::move(grid);
+    } catch (const InputError& error) {
+      if (result_) result_->fault = std::current_exception();
+      throw std::runtime_error(error.what());
+    }
+  }
+
+ private:
+  void fill(aiScene& scene, const DemGrid& grid) const {
+    std::unique_ptr<aiMesh> mesh = make_mesh(grid, stride_);
+    if (mesh->mNumFaces == 0) mesh = make_mesh(grid, 1);  // a coarse net may catch nothing but holes
+    scene.mMaterials = new aiMaterial* [1] { new aiMaterial };
+    scene.mNumMaterials = 1;
+    scene.mMeshes = new aiMesh* [1] { mesh.release() };
+    scene.mNumMeshes = 1;
+    scene.mRootNode = new aiNode("terrain");
+    scene.mRootNode->mMeshes = new unsigned[1]{0};
+    scene.mRootNode->mNumMeshes = 1;
+    scene.mMetaData = aiMetadata::Alloc(4);
+    scene.mMetaData->Set(0, "origin_x", grid.corner.x());
+    scene.mMetaData->Set(1, "origin_y", grid.corner.y());
+    scene.mMetaData->Set(2, "cell_x", grid.spacing.x());
+    scene.mMetaData->Set(3, "cell_y", grid.spacing.y());
+  }
+
+  std::shared_ptr<DemResult> result_;
+  int stride_ = 1;
+};
+
+}  // namespace
+
+Assimp::BaseImporter* make_asc_importer(std::shared_ptr<DemResult> result) { return new AscImporter(std::move(result)); }
+
+}  // namespace effuse::importers

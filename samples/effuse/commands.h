@@ -1,0 +1,35 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "geometry/base/error.h"
+
+/// The verbs of the program. Each prints data on stdout, talk on stderr, and returns the exit code;
+/// errors are thrown and turned into codes by main().
+namespace effuse {
+
+struct CommonOptions {
+  bool json = false, quiet = false;
+  int threads = 0;  ///< 0: all
+};
+
+struct RunCommand {
+  std::filesystem::path scene, folder;
+  int frames = 0;  ///< 0: as the scene says
+  bool resume = false, force = false;
+  std::vector<std::string> set;
+};
+ExitCode run(const RunCommand& command, const CommonOptions& common);
+
+struct CheckCommand {
+  std::filesystem::path scene;
+  std::vector<std::string> set;
+};
+ExitCode check(const CheckCommand& command, const CommonOptions& common);
+
+ExitCode info(const std::vector<std::filesystem::path>& files, const CommonOptions& common);
+ExitCode effects(const CommonOptions& common);
+
+}  // namespace effuse

@@ -1,0 +1,133 @@
+#include "samples/effuse/frame_writer.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "geometry/base/files.h"
+#include "geometry/base/zones.h"
+#include "geometry/mesh/measure.h"
+#include "skin/color/lava_color.h"
+#include "skin/detail/displace.h"
+#include "skin/preview/preview.h"
+#include "skin/surface/level_set.h"
+
+namespace effuse {
+
+namespace fs = std::filesystem;
+
+namespace {
+std::string numbered(const char* stem, int frame, const char* extension) { return fmt::format("{}.{:04}.{}", stem, frame, extension); }
+}  // namespace
+
+FrameWriter::FrameWriter(const flow::Scene& scene, const skin::SkinSettings& settings, const geometry::Terrain& terrain, fs::path folder)
+    : scene_(scene), settings_(settings), terrain_(terrain), folder_(std::move(folder)) {
+  if (settings.preview) preview_ = std::make_unique<skin::Preview>(terrain.mesh());
+}
+FrameWriter::~FrameWriter() = default;
+
+skin::Metadata FrameWriter::metadata(int frame, Real time) const {
+  const geometry::Georeference& geo = terrain_.georeference();
+  return {{"generator", "effuse"},
+          {"scene", scene_.name},
+          {"frame", std::to_string(frame)},
+          {"time_s", fmt::format("{}", time)},
+          {"origin", fmt::format("{:.17g} {:.17g} {:.17g}", geo.origin.x(), geo.origin.y(), geo.origin.z())},
+          {"crs", geo.crs},
+          {"units", "metres, seconds, kelvin"}};
+}
+
+void FrameWriter::write_terrain() {
+  ZONE("write.terrain");
+  skin::write_ply(folder_ / "terrain.ply", terrain_.mesh(), metadata(0, 0));
+  skin::write_glb(folder_ / "terrain.glb", terrain_.mesh(), metadata(0, 0));
+}
+
+FrameWriter::Result FrameWriter::write_frame(const flow::Simulation& simulation) {
+  const int frame = simulation.frame();
+  const skin::Metadata about = metadata(frame, simulation.time());
+  Result result;
+  if (!settings_.ply && !settings_.obj && !settings_.glb && !settings_.vdb && !preview_) return result;  // nobody asked for a skin
+  geometry::TriMesh mesh;
+  skin::LevelSet surface;
+  for (const auto& effect : simulation.effects()) {
+    if (effect->spacing() <= 0) continue;
+    skin::LevelSetOptions options = settings_.level_set;
+    options.spacing = effect->spacing();
+    options.voxel = settings_.voxel * options.spacing;
+    const geometry::Points points = effect->points();
+    surface = skin::build_level_set(points, effect->volume(), &terrain_, options);
+    mesh = skin::mesh_level_set(surface);
+    result.volume = surface.report().volume;
+    result.particle_volume = effect->volume();
+    skin::DisplaceOptions detail = settings_.detail;
+    detail.spacing = options.spacing;
+    detail.seed = scene_.seed;
+    detail.rest_ratio = points.rest_ratio;
+    skin::displace(mesh, &terrain_, detail);
+    skin::color_lava(mesh, settings_.color);
+  }
+  result.triangles = mesh.triangles.size();
+  COUNT("skin.triangles", mesh.triangles.size());
+
+  const fs::path frames = folder_ / "frames";
+  if (settings_.ply) skin::write_ply(frames / numbered("skin", frame, "ply"), mesh, about);
+  if (settings_.obj) skin::write_obj(frames / numbered("skin", frame, "obj"), mesh, about);
+  if (settings_.glb) skin::write_glb(frames / numbered("skin", frame, "glb"), mesh, about);
+  if (settings_.vdb) skin::write_vdb(frames / numbered("lava", frame, "vdb"), surface, about);
+  if (preview_) {
+    const Real share = scene_.frames > 1 ? (frame - 1) / static_cast<Real>(scene_.frames - 1) : 0;
+    const skin::Image image = preview_->render(mesh, skin::picture_at(settings_, terrain_, share));
+    skin::write_png(folder_ / "preview" / numbered("preview", frame, "png"), image);
+  }
+  return result;
+}
+
+void FrameWriter::write_contact_sheet(int frames) {
+  if (!preview_ || frames < 1) return;
+  ZONE("preview.contact_sheet");
+  const int count = std::min(frames, 12);
+  std::vector<fs::path> pictures;
+  std::vector<std::string> labels;
+  for (int k = 0; k < count; ++k) {
+    const int frame = count == 1 ? 1 : 1 + static_cast<int>((frames - 1) * static_cast<Real>(k) / (count - 1) + 0.5);
+    pictures.push_back(folder_ / "preview" / numbered("preview", frame, "png"));
+    labels.push_back(fmt::format("frame {}   {:.0f} s", frame, scene_.frame_time(frame)));
+  }
+  skin::write_contact_sheet(folder_ / "preview" / "contact_sheet.png", pictures, labels, 3);
+}
+
+void FrameWriter::write_manifest(int frames_done) const {
+  using nlohmann::ordered_json;
+  const geometry::Georeference& geo = terrain_.georeference();
+  ordered_json m;
+  m["format"] = 1;
+  m["name"] = scene_.name;
+  m["frames"] = frames_done;
+  m["first_frame"] = 1;
+  m["fps"] = scene_.fps;
+  m["time_scale"] = scene_.time_scale;
+  m["units"] = {{"length", "m"}, {"time", "s"}, {"temperature", "K"}, {"velocity", "m/s"}};
+  m["up_axis"] = {{"ply", "z"}, {"obj", "z"}, {"vdb", "z"}, {"glb", "y"}};
+  m["origin"] = {geo.origin.x(), geo.origin.y(), geo.origin.z()};
+  m["crs"] = geo.crs;
+  m["color_space"] = {{"ply", "srgb"}, {"obj", "srgb"}, {"glb", "linear"}};
+  const Box3 box = terrain_.bounds();
+  m["terrain"] = {{"files", {"terrain.ply", "terrain.glb"}},
+                  {"min", {box.min().x(), box.min().y(), box.min().z()}},
+                  {"max", {box.max().x(), box.max().y(), box.max().z()}}};
+  ordered_json files;
+  if (settings_.ply) files["ply"] = "frames/skin.####.ply";
+  if (settings_.obj) files["obj"] = "frames/skin.####.obj";
+  if (settings_.glb) files["glb"] = "frames/skin.####.glb";
+  if (settings_.vdb) files["vdb"] = "frames/lava.####.vdb";
+  if (settings_.preview) files["preview"] = "preview/preview.####.png";
+  m["files"] = files;
+  m["attributes"] = {{"temperature", "K"}, {"velocity", "m/s"}, {"crust", "0 molten .. 1 solid"}};
+  ordered_json times = ordered_json::array();
+  for (int frame = 1; frame <= frames_done; ++frame) times.push_back(scene_.frame_time(frame));
+  m["frame_times"] = times;
+  write_file(folder_ / "manifest.json", m.dump(1) + "\n");
+}
+
+}  // namespace effuse

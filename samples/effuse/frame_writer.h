@@ -1,0 +1,50 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "flow/scene/scene.h"
+#include "flow/scene/simulation.h"
+#include "geometry/terrain/terrain.h"
+#include "skin/scene/skin_settings.h"
+#include "skin/write/write_mesh.h"
+
+namespace effuse {
+
+/// Turns the simulation's state into the files of a frame: skin meshes, volume, picture; and the run
+/// folder's terrain, contact sheet and manifest. Stateless from frame to frame, so that a run resumed
+/// writes the bytes it would have.
+class FrameWriter {
+ public:
+  FrameWriter(const flow::Scene& scene, const skin::SkinSettings& settings, const geometry::Terrain& terrain, std::filesystem::path folder);
+  ~FrameWriter();
+
+  /// terrain.ply, terrain.glb
+  void write_terrain();
+
+  struct Result {
+    std::size_t triangles = 0;
+    Real volume = 0;           ///< enclosed by the skin above ground [m^3]
+    Real particle_volume = 0;  ///< [m^3]
+  };
+  /// frames/skin.0001.*, frames/lava.0001.vdb, preview/preview.0001.png
+  Result write_frame(const flow::Simulation& simulation);
+
+  /// preview/contact_sheet.png of twelve pictures spread over the film; nothing without pictures.
+  void write_contact_sheet(int frames);
+
+  /// manifest.json: what is where, in which units.
+  void write_manifest(int frames_done) const;
+
+ private:
+  skin::Metadata metadata(int frame, Real time) const;
+  const flow::Scene& scene_;
+  const skin::SkinSettings& settings_;
+  const geometry::Terrain& terrain_;
+  std::filesystem::path folder_;
+  std::unique_ptr<skin::Preview> preview_;
+};
+
+}  // namespace effuse

@@ -1,0 +1,75 @@
+#include "samples/effuse/load_scene.h"
+
+#include <algorithm>
+
+#include "flow/effects/registry.h"
+#include "geometry/base/hash.h"
+#include "geometry/base/zones.h"
+#include "importers/scene/scene_file.h"
+#include "importers/terrain/import_terrain.h"
+
+namespace effuse {
+
+namespace {
+/// The tables that decide the state of frame n, whatever the number of frames and the files made of it.
+std::string state_key(const flow::Node& resolved, const geometry::Terrain& terrain) {
+  StateHash hash;
+  for (const auto& [name, value] : resolved.entries) {
+    if (name == "skin" || name == "output" || name == "preview" || name == "name") continue;
+    flow::Node part;
+    flow::Node& copy = part.set(name, value);
+    if (name == "film") copy.set("frames", flow::Node{});
+    if (name == "terrain") copy.set("file", flow::Node{});  // what it holds counts, not where it lies
+    hash.add(importers::to_toml(part));
+  }
+  hash.add(std::span<const Vec3>(terrain.mesh().positions));
+  hash.add(terrain.georeference().origin.x());
+  hash.add(terrain.georeference().origin.y());
+  return hash.hex();
+}
+}  // namespace
+
+std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const std::vector<std::string>& overrides, int frames) {
+  ZONE("load");
+  flow::Node node = importers::read_scene_file(file);
+  for (const std::string& assignment : overrides) importers::apply_override(node, assignment);
+  if (frames > 0) importers::apply_override(node, "film.frames=" + std::to_string(frames));
+
+  auto loaded = std::make_unique<LoadedScene>();
+  std::vector<Fault> faults;
+  flow::Parameters root(node);
+  loaded->scene = flow::read_scene(root, flow::effect_kinds());
+  loaded->skin = skin::read_skin_settings(root);
+  try {
+    root.finish();
+  } catch (const InputError& error) {
+    faults = error.faults();
+  }
+
+  const flow::Scene& scene = loaded->scene;
+  if (!scene.terrain_file.empty()) {
+    try {
+      std::filesystem::path path = scene.terrain_file;
+      if (path.is_relative()) path = file.parent_path() / path;
+      importers::TerrainImport import = importers::import_terrain(path, {scene.ground_temperature, scene.terrain_crs});
+      loaded->terrain = std::move(import.terrain);
+      loaded->notes = std::move(import.notes);
+    } catch (const InputError& error) {
+      // Told at the scene's line that names the file; the file's own line and column stay in the words.
+      for (const Fault& fault : error.faults()) faults.push_back({scene.terrain_place, to_string(fault)});
+    }
+  }
+  if (faults.empty() && loaded->terrain) {
+    loaded->simulation = std::make_unique<flow::Simulation>(scene, flow::World{&*loaded->terrain, scene.seed});
+    const flow::Node resolved = root.resolved();
+    loaded->resolved = importers::to_toml(resolved);
+    loaded->key = state_key(resolved, *loaded->terrain);
+  }
+  if (!faults.empty()) {
+    std::stable_sort(faults.begin(), faults.end(), [](const Fault& a, const Fault& b) { return a.place.line < b.place.line; });
+    throw InputError(faults);
+  }
+  return loaded;
+}
+
+}  // namespace effuse

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "flow/scene/scene.h"
+#include "flow/scene/simulation.h"
+#include "geometry/terrain/terrain.h"
+#include "skin/scene/skin_settings.h"
+
+namespace effuse {
+
+/// A scene file, read to the end: its settings, its terrain, and the simulation built from both.
+struct LoadedScene {
+  flow::Scene scene;
+  skin::SkinSettings skin;
+  std::string resolved;  ///< TOML, every default filled in
+  std::string key;       ///< hash of what the simulation's state depends on: for checkpoints
+  std::optional<geometry::Terrain> terrain;
+  std::vector<std::string> notes;  ///< of the terrain's import
+  std::unique_ptr<flow::Simulation> simulation;
+};
+
+/// Throws InputError with every fault of the scene, the terrain's file among them; nothing is written.
+/// overrides: key=value each; frames > 0 replaces film.frames.
+std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const std::vector<std::string>& overrides, int frames);
+
+}  // namespace effuse

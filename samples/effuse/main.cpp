@@ -1,0 +1,105 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <new>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "geometry/base/log.h"
+#include "geometry/base/parallel.h"
+#include "samples/effuse/commands.h"
+
+namespace {
+
+using effuse::ExitCode;
+
+/// One error as a line for people, or as the JSON document that --json promises.
+int report(ExitCode code, const std::vector<effuse::Fault>& faults, bool json) {
+  if (json) {
+    nlohmann::ordered_json j;
+    j["ok"] = false;
+    j["exit_code"] = static_cast<int>(code);
+    for (const effuse::Fault& fault : faults)
+      j["errors"].push_back({{"file", fault.place.file}, {"line", fault.place.line}, {"column", fault.place.column}, {"message", fault.message}});
+    fmt::print("{}\n", j.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  }
+  for (const effuse::Fault& fault : faults) fmt::print(stderr, "error: {}\n", to_string(fault));
+  return static_cast<int>(code);
+}
+
+int report(ExitCode code, const std::string& message, bool json) { return report(code, std::vector<effuse::Fault>{{effuse::Place{}, message}}, json); }
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"effuse: lava over real terrain"};
+  app.set_version_flag("--version", std::string("effuse ") + EFFUSE_VERSION);
+  app.require_subcommand(1);
+  app.fallthrough();
+  app.footer("Exit codes: 0 done, 1 failed, 2 wrong use or bad input, 4 unstable, 5 out of disk or memory, 130 interrupted.");
+
+  effuse::CommonOptions common;
+  const auto add_common = [&](CLI::App* verb) {
+    verb->add_flag("--json", common.json, "one JSON document on stdout, nothing else there");
+    verb->add_flag("-q,--quiet", common.quiet, "no progress, no talk");
+    verb->add_option("--threads", common.threads, "threads to use; all when absent")->check(CLI::Range(1, 1024));
+    return verb;
+  };
+
+  effuse::RunCommand run;
+  CLI::App* run_verb = add_common(app.add_subcommand("run", "simulate a scene and write its frames"));
+  run_verb->add_option("scene", run.scene, "scene file (TOML)")->required();
+  run_verb->add_option("-o,--output", run.folder, "folder to write; out/SCENE when absent");
+  run_verb->add_option("--frames", run.frames, "make this many frames")->check(CLI::Range(1, 9999));
+  run_verb->add_flag("--resume", run.resume, "go on from the newest checkpoint in the folder");
+  run_verb->add_flag("--force", run.force, "replace the run that the folder holds");
+  run_verb->add_option("--set", run.set, "key=value, overrides the scene: --set lava.spacing='2 m'")->allow_extra_args(false);
+
+  effuse::CheckCommand check;
+  CLI::App* check_verb = add_common(app.add_subcommand("check", "say all that is wrong with a scene, or what it would cost"));
+  check_verb->add_option("scene", check.scene, "scene file (TOML)")->required();
+  check_verb->add_option("--set", check.set, "key=value, overrides the scene")->allow_extra_args(false);
+
+  std::vector<std::filesystem::path> files;
+  CLI::App* info_verb = add_common(app.add_subcommand("info", "facts of files: terrain, meshes, volumes, scenes, run folders"));
+  info_verb->add_option("file", files, "files")->required();
+
+  CLI::App* effects_verb = add_common(app.add_subcommand("effects", "the effects there are, and their parameters"));
+
+  // A typing error in the verb: name the nearest one instead of CLI11's list.
+  if (argc > 1 && argv[1][0] != '-') {
+    const std::vector<std::string> verbs = {"run", "check", "info", "effects"};
+    if (std::find(verbs.begin(), verbs.end(), argv[1]) == verbs.end()) {
+      const std::string nearest = effuse::nearest_name(argv[1], verbs);
+      return report(ExitCode::kBadInput, fmt::format("no verb '{}'; {}", argv[1], nearest.empty() ? "there are run, check, info, effects" : "did you mean '" + nearest + "'?"), false);
+    }
+  }
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
+    return report(ExitCode::kBadInput, fmt::format("{} (see --help)", error.what()), common.json);
+  }
+
+  if (common.quiet || common.json) effuse::set_log_level(effuse::LogLevel::kWarnings);
+  std::optional<effuse::ThreadLimit> limit;
+  if (common.threads > 0) limit.emplace(common.threads);
+  try {
+    if (*run_verb) return static_cast<int>(effuse::run(run, common));
+    if (*check_verb) return static_cast<int>(effuse::check(check, common));
+    if (*info_verb) return static_cast<int>(effuse::info(files, common));
+    if (*effects_verb) return static_cast<int>(effuse::effects(common));
+  } catch (const effuse::InputError& error) {
+    return report(ExitCode::kBadInput, error.faults(), common.json);
+  } catch (const effuse::UnstableError& error) {
+    return report(ExitCode::kUnstable, error.what(), common.json);
+  } catch (const effuse::ResourceError& error) {
+    return report(ExitCode::kOutOfResources, error.what(), common.json);
+  } catch (const std::bad_alloc&) {
+    return report(ExitCode::kOutOfResources, "out of memory", common.json);
+  } catch (const std::exception& error) {
+    return report(ExitCode::kFailed, error.what(), common.json);
+  }
+  return static_cast<int>(ExitCode::kFailed);
+}

@@ -1,0 +1,75 @@
+#include "skin/scene/skin_settings.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace effuse::skin {
+
+SkinSettings read_skin_settings(flow::Parameters& root) {
+  using flow::Parameters;
+  SkinSettings s;
+
+  Parameters skin = root.table("skin", "the lava's surface");
+  s.voxel = skin.number("voxel", "", s.voxel, {0.1, 1}, "of the level set, in particle spacings");
+  LevelSetOptions& level_set = s.level_set;
+  level_set.influence = skin.number("influence", "", level_set.influence, {1, 4}, "a particle is felt within this many spacings");
+  level_set.radius = skin.number("radius", "", level_set.radius, {0.3, 1}, "of the sphere round a lone particle, in spacings");
+  level_set.smoothing = static_cast<int>(skin.integer("smoothing", level_set.smoothing, 0, 20, "passes of mean-curvature flow"));
+  level_set.drop_volume = skin.number("drop_volume", "", level_set.drop_volume, Parameters::not_negative(), "pieces of fewer particles are left out");
+  level_set.match_volume = skin.flag("match_volume", level_set.match_volume, "enclose the particles' volume");
+  DisplaceOptions& detail = s.detail;
+  detail.amplitude = skin.number("amplitude", "", detail.amplitude, Parameters::not_negative(), "of the bumps where cold, in spacings; 0: none");
+  detail.wavelength = skin.number("wavelength", "", detail.wavelength, Parameters::positive(), "of the coarsest bumps, in spacings");
+  detail.octaves = static_cast<int>(skin.integer("octaves", detail.octaves, 1, 12, "of the bumps, each half as wide"));
+  detail.gain = skin.number("gain", "", detail.gain, {0, 1}, "height from octave to octave");
+  detail.roughness = skin.number("roughness", "", detail.roughness, {0, 1}, "0 swells, 1 clinker");
+  detail.edge = skin.number("edge", "", detail.edge, {0.05, 10}, "length of the mesh's edges, in spacings");
+  s.color.strength = skin.number("glow", "", s.color.strength, Parameters::not_negative(), "light of lava at 1200 degC, white paper in the sun is 1");
+
+  Parameters output = root.table("output", "what is written for each frame");
+  const std::vector<std::string> formats = {"ply", "obj", "glb", "vdb"};
+  const std::vector<std::size_t> wanted = output.choices("formats", formats, {0, 1, 2, 3}, "files of the skin");
+  const auto has = [&](std::size_t format) { return std::find(wanted.begin(), wanted.end(), format) != wanted.end(); };
+  s.ply = has(0);
+  s.obj = has(1);
+  s.glb = has(2);
+  s.vdb = has(3);
+  s.checkpoint_every = static_cast<int>(output.integer("checkpoint_every", s.checkpoint_every, 1, 10000, "frames between two checkpoints"));
+
+  Parameters preview = root.table("preview", "a ray-traced picture for each frame");
+  s.preview = preview.flag("pictures", s.preview, "make them");
+  PreviewOptions& picture = s.picture;
+  picture.width = static_cast<int>(preview.integer("width", picture.width, 16, 8192, "pixels"));
+  picture.height = static_cast<int>(preview.integer("height", picture.height, 16, 8192, "pixels"));
+  picture.samples = static_cast<int>(preview.integer("samples", picture.samples, 1, 256, "rays a pixel"));
+  picture.exposure = preview.number("exposure", "", picture.exposure, Parameters::positive(), "");
+  picture.sun = preview.number("sun", "", picture.sun, Parameters::not_negative(), "strength");
+  picture.sky = preview.number("sky", "", picture.sky, Parameters::not_negative(), "strength");
+  const Vec3 sun = picture.sun_direction.normalized();
+  const Real sun_azimuth = preview.number("sun_azimuth", "rad", std::atan2(sun.y(), sun.x()), {}, "where the sun stands, counter-clockwise from east");
+  const Real sun_elevation = preview.number("sun_elevation", "rad", std::asin(sun.z()), {-1.5, 1.5}, "above the horizon: low is dusk, 0.6 is day");
+  picture.sun_direction = Vec3(std::cos(sun_azimuth) * std::cos(sun_elevation), std::sin(sun_azimuth) * std::cos(sun_elevation), std::sin(sun_elevation));
+  picture.haze = preview.number("haze", "", picture.haze, Parameters::not_negative(), "");
+  picture.glow_light = preview.number("glow_light", "", picture.glow_light, Parameters::not_negative(), "how much lava lights the ground");
+  s.azimuth = preview.number("azimuth", "rad", -2.2, {}, "where the camera stands, counter-clockwise from east");
+  s.elevation = preview.number("elevation", "rad", 0.5, {-0.2, 1.5}, "of the camera above the horizon");
+  s.turn = preview.number("turn", "rad", 0, {}, "of the camera round its target over the film");
+  s.view = preview.numbers("view", "m", 3, false, "x, y in the terrain file's coordinates and radius of what the camera frames; absent: all the terrain");
+  if (s.view.size() == 3 && s.view[2] <= 0) preview.fault("view", "the radius, third number, is not above 0");
+  return s;
+}
+
+PreviewOptions picture_at(const SkinSettings& s, const geometry::Terrain& terrain, Real share) {
+  Box3 box = terrain.bounds();
+  if (s.view.size() == 3) {
+    const Vec2 at = Vec2(s.view[0], s.view[1]) - terrain.georeference().origin.head<2>();
+    const Real z = terrain.height(at.x(), at.y()).value_or(box.center().z()), r = s.view[2];
+    // Flat: ground is wider than it is high.
+    box = Box3(Vec3(at.x() - r, at.y() - r, z - r / 4), Vec3(at.x() + r, at.y() + r, z + r / 4));
+  }
+  PreviewOptions picture = s.picture;
+  picture.camera = frame_camera(box, s.azimuth + share * s.turn, s.elevation, static_cast<Real>(picture.width) / picture.height, 0.02);
+  return picture;
+}
+
+}  // namespace effuse::skin

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "flow/scene/parameters.h"
+#include "geometry/terrain/terrain.h"
+#include "skin/color/lava_color.h"
+#include "skin/detail/displace.h"
+#include "skin/preview/preview.h"
+#include "skin/surface/level_set.h"
+
+namespace effuse::skin {
+
+/// The tables [skin], [output] and [preview] of a scene.
+struct SkinSettings {
+  LevelSetOptions level_set;  ///< spacing is the effect's, set when there is one
+  Real voxel = 0.5;           ///< in spacings
+  DisplaceOptions detail;     ///< spacing, rest_ratio and seed are filled in frame by frame
+  LavaColorOptions color;
+
+  bool ply = true, obj = true, glb = true, vdb = true;
+  int checkpoint_every = 10;  ///< frames
+
+  bool preview = true;
+  PreviewOptions picture;
+  Real azimuth = 0, elevation = 0;  ///< of the camera [rad]
+  Real turn = 0;                    ///< of the azimuth over the whole film [rad]
+  std::vector<Real> view;           ///< map x, y [m] of the middle and the radius of what is looked at; empty: the terrain
+};
+
+SkinSettings read_skin_settings(flow::Parameters& root);
+
+/// The picture's options at a share 0..1 of the film.
+PreviewOptions picture_at(const SkinSettings& settings, const geometry::Terrain& terrain, Real share);
+
+}  // namespace effuse::skin

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "skin/surface/key_table.h"
+
+/// Sparse voxels: cubes of 8^3, as OpenVDB's leaves have them, in plain arrays.
+///
+/// Lengths and coordinates are in voxels from the level set's origin: voxel (i, j, k) is the point (i, j, k). A field is an
+/// array of 512 numbers a block, z fastest, blocks in the order of Blocks::coords. Signed distances are negative inside.
+namespace effuse::skin {
+
+inline constexpr int kSide = 8;
+inline constexpr std::size_t kVoxels = 512;
+using BlockCoord = std::array<int, 3>;  ///< block (a, b, c) holds voxels 8a .. 8a+7, ...
+using Field = std::vector<float>;
+
+inline std::size_t voxel_index(int i, int j, int k) { return static_cast<std::size_t>((i << 6) | (j << 3) | k); }
+
+class Blocks {
+ public:
+  Blocks() = default;
+  /// coords: each once; sorted here.
+  explicit Blocks(std::vector<BlockCoord> coords);
+
+  std::size_t size() const { return coords_.size(); }
+  const std::vector<BlockCoord>& coords() const { return coords_; }
+  /// Blocks around block b, itself in the middle (13), by (dx+1)*9 + (dy+1)*3 + dz+1; kNone: there is none.
+  const std::array<Index, 27>& around(std::size_t b) const { return around_[b]; }
+
+  /// Value at a voxel, `outside` where there is no block. home: a block believed near.
+  float at(std::span<const float> field, float outside, Index home, int i, int j, int k) const {
+    const Index b = block_of(home, i >> 3, j >> 3, k >> 3);
+    return b == kNone ? outside : field[b * kVoxels + voxel_index(i & 7, j & 7, k & 7)];
+  }
+  /// Trilinear between voxels.
+  float sample(std::span<const float> field, float outside, Index home, const Vec3& p) const;
+  /// Central differences at the eight voxels round p, trilinear between them.
+  Vec3 gradient(std::span<const float> field, float outside, Index home, const Vec3& p) const;
+  /// The block that holds the point, or kNone.
+  Index block_at(const Vec3& p) const;
+
+  /// Block b with one voxel of its neighbours around it: 10^3 numbers, z fastest.
+  void padded(std::span<const float> field, float outside, std::size_t b, float* out) const;
+
+ private:
+  Index block_of(Index home, int a, int b, int c) const {
+    if (home != kNone) {
+      const BlockCoord& h = coords_[home];
+      const int da = a - h[0] + 1, db = b - h[1] + 1, dc = c - h[2] + 1;
+      if (static_cast<unsigned>(da) < 3 && static_cast<unsigned>(db) < 3 && static_cast<unsigned>(dc) < 3)
+        return around_[home][static_cast<std::size_t>(da * 9 + db * 3 + dc)];
+    }
+    return find(a, b, c);
+  }
+  Index find(int a, int b, int c) const { return table_.find(pack(a, b, c)); }
+
+  std::vector<BlockCoord> coords_;
+  std::vector<std::array<Index, 27>> around_;
+  KeyTable table_;
+};
+
+}  // namespace effuse::skin

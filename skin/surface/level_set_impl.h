@@ -1,0 +1,63 @@
+#pragma once
+
+#include <optional>
+
+#include "skin/surface/blocks.h"
+#include "skin/surface/level_set.h"
+#include "skin/surface/particle_grid.h"
+
+/// For the .cpp files of this folder: what a level set holds, and the steps of its making. Lengths in voxels unless [m].
+namespace effuse::skin {
+
+struct LevelSet::Impl {
+  Real voxel = 1;             ///< [m]
+  Real spacing = 1;           ///< [m]
+  float reach = 4;            ///< of a particle
+  float outside = 2.8f;       ///< value where there are no blocks; nothing is larger
+  float lift = 1;             ///< below this height over the ground a point counts as lifted to it
+  ParticleGrid particles;
+  Blocks blocks;
+  Field phi;                  ///< the surface is its zero level; about a distance near it
+  std::optional<geometry::Terrain> terrain;
+  LevelSetReport report;
+
+  Vec3 world(const Vec3& p) const { return particles.origin() + voxel * p; }
+};
+
+/// The ground on a level set's voxels.
+struct GroundField {
+  Field distance;  ///< signed, above the ground positive; kNoGround where there is none
+  Field above;     ///< share of the voxel's cube above ground, 0..1
+  std::vector<Eigen::Vector3f> normal;
+};
+inline constexpr float kNoGround = 1e9f;
+
+/// Ground distances at every second voxel from the terrain, trilinear between; blocks farther from the ground
+/// than `reach` are kNoGround above it and -kNoGround below.
+GroundField sample_ground(const LevelSet::Impl& s, const geometry::Terrain& terrain, float reach);
+
+/// phi out: s.phi with every voxel lower than s.lift over the ground given the value of the point at that height along the
+/// normal; voxels deeper than `depth` are left as they are.
+void lift_to_ground(const LevelSet::Impl& s, const GroundField& ground, float depth, Field& phi);
+
+/// Mean-curvature flow phi_t = kappa |grad phi| for a time [voxels^2], in explicit steps; where W (rasterize.h) is like a
+/// lone particle's nothing moves. lone, sheet: W at the surface of a lone particle and of a plane sheet.
+void smooth(const Blocks& blocks, float outside, float time, const Field& weight, float lone, float sheet, Field& phi);
+
+/// Volume [voxels] where phi < shift and above ground, phi linear in six tetrahedra a cell: what a mesh through the
+/// same crossings encloses. above: GroundField::above, or empty.
+Real enclosed(const Blocks& blocks, float outside, const Field& phi, const Field& above, float shift);
+/// The shift within +-most at which enclosed() is the target to 1e-4 of it; the nearer end when there is none.
+float matching_shift(const Blocks& blocks, float outside, const Field& phi, const Field& above, Real target, float most);
+
+/// Turns face-connected sets of inner voxels smaller than `least` [voxels] into outer ones, and closed bubbles likewise.
+void drop_small_pieces(const Blocks& blocks, Real least, Field& phi, LevelSetReport& report);
+
+/// Distances to the zero level of phi, right to a twentieth of a voxel beside it and a fifth three voxels away, out to +-band and cut there; the zero level
+/// stays where it is to a twentieth. Voxels without a block are outside.
+Field distances(const Blocks& blocks, float outside, const Field& phi, float band);
+
+/// The particles' carried numbers at points [voxels], taken at the lifted point near the ground.
+std::vector<float> carried_at(const LevelSet::Impl& s, std::vector<Vec3> points);
+
+}  // namespace effuse::skin

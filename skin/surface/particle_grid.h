@@ -1,0 +1,74 @@
+#pragma once
+
+#include <cmath>
+#include <span>
+#include <vector>
+
+#include "geometry/mesh/points.h"
+#include "skin/surface/key_table.h"
+
+namespace effuse::skin {
+
+/// The particles, sorted into upright columns and by height inside each: all within a box are a few
+/// runs of neighbouring elements. Coordinates in voxels from origin (blocks.h).
+class ParticleGrid {
+ public:
+  ParticleGrid() = default;
+  /// voxel: [m]; side: of a column [voxels]. Throws InputError for positions that are not finite, radii that
+  /// are not finite or <= 0, and extents beyond 2^20 voxels.
+  ParticleGrid(const geometry::Points& points, Real voxel, Real side);
+
+  std::size_t size() const { return x_.size(); }
+  /// A multiple of 8 voxels [m], near the particles' middle: floats count from here, and frames share one lattice.
+  const Vec3& origin() const { return origin_; }
+  const std::vector<Vec3>& x() const { return x_; }       ///< sorted [voxels]
+  const std::vector<float>& radius() const { return radius_; }  ///< sorted [voxels]
+
+  struct Column {
+    int x, y;          // which square of side
+    Index begin, end;  // its particles, by rising z
+  };
+  const std::vector<Column>& columns() const { return columns_; }
+
+  /// f(begin, end) for runs that together hold every particle in the box (and others of the same columns), west to east,
+  /// south to north: an order that does not depend on the points' own.
+  template <class F>
+  void runs(const Vec3& low, const Vec3& high, F&& f) const {
+    const int x0 = column_of(low.x()), x1 = column_of(high.x()), y0 = column_of(low.y()), y1 = column_of(high.y());
+    for (int cx = x0; cx <= x1; ++cx)
+      for (int cy = y0; cy <= y1; ++cy) {
+        const Index c = table_.find(pack(cx, cy, 0));
+        if (c == kNone) continue;
+        const Index begin = first_above(columns_[c], low.z()), end = first_above(columns_[c], high.z());
+        if (begin < end) f(begin, end);
+      }
+  }
+
+  /// Numbers carried beside the positions, `width` a particle, in the order temperature 1, velocity 3, crust 1, age 1,
+  /// rest 3, rest2 3, each only if the points had it. offset -1: they had not.
+  struct Carried {
+    int width = 0;
+    int temperature = -1, velocity = -1, crust = -1, age = -1, rest = -1, rest2 = -1;
+  };
+  const Carried& carried() const { return carried_; }
+  /// The carried numbers of sorted particle i.
+  const float* values(std::size_t i) const { return &values_[i * static_cast<std::size_t>(carried_.width)]; }
+
+  /// Averages of the carried numbers with weights (1 - |x - x_i|^2 / reach^2)^3 at each of the points [voxels]. Where
+  /// none is within reach, with the reach doubled until one is. out: carried().width numbers a point.
+  void average(std::span<const Vec3> points, Real reach, std::span<float> out) const;
+
+ private:
+  int column_of(Real v) const;
+  Index first_above(const Column& column, Real z) const;
+
+  Vec3 origin_ = Vec3::Zero();
+  Real side_ = 1;
+  std::vector<Vec3> x_;
+  std::vector<float> radius_, values_;
+  std::vector<Column> columns_;
+  KeyTable table_;
+  Carried carried_;
+};
+
+}  // namespace effuse::skin

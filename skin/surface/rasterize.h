@@ -1,0 +1,33 @@
+#pragma once
+
+#include "skin/surface/blocks.h"
+#include "skin/surface/particle_grid.h"
+
+namespace effuse::skin {
+
+/// All lengths in voxels.
+struct RasterOptions {
+  float reach = 4;        ///< R: a particle is felt this far
+  float spacing = 2;      ///< of the particles
+  float radius_factor = 1.2f;  ///< rbar in units of the particles' own radii
+  float outside = 2.8f;   ///< values are cut here
+};
+
+/// The blocks with a voxel closer than reach to a particle.
+Blocks blocks_around(const ParticleGrid& particles, Real reach);
+
+/// Zhu & Bridson's field with the bound between separate particles (build_level_set's docstring):
+///
+///   w_i = max(0, 1 - |x - x_i|^2 / R^2)^3        W = sum w_i
+///   phi = max(|x - sum w_i x_i / W| - sum w_i r_i / W,  3 (min |x - x_i| - spacing)),   at most `outside`
+///
+///   phi     out: the field [voxels]
+///   weight  out: W
+/// Gathered block by block in float, coordinates counted from the block; within 1e-4 voxels of double.
+/// Same bits on any number of threads and any order of the points.
+void rasterize(const ParticleGrid& particles, const Blocks& blocks, const RasterOptions& options, Field& phi, Field& weight);
+
+/// The same at one point, in double, over all particles: the twin that tests compare with.
+Real zhu_bridson(const ParticleGrid& particles, const RasterOptions& options, const Vec3& p);
+
+}  // namespace effuse::skin

@@ -1,0 +1,168 @@
+#include <openvdb/io/File.h>
+#include <openvdb/openvdb.h>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/base/error.h"
+#include "geometry/base/files.h"
+#include "geometry/base/parallel.h"
+#include "geometry/base/zones.h"
+#include "skin/surface/level_set_impl.h"
+#include "skin/surface/vdb_layout.h"
+
+namespace effuse::skin {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr float kBand = 3;  // [voxels] half width of the level set
+
+/// What a package said, fit for a line: OpenVDB's words on a broken file can be hundreds of megabytes of its bytes.
+std::string brief(const char* words) {
+  std::string text;
+  for (const char* c = words; *c != 0 && text.size() < 200; ++c) text += *c >= ' ' && *c <= '~' ? *c : '?';
+  return text;
+}
+
+/// Blocks as a grid of OpenVDB in the world. value(block, voxel) and on(block, voxel); blocks of nothing on are left out,
+/// or a tile `deep` if every value is that.
+template <class Grid, class Value, class On>
+typename Grid::Ptr make_grid(const LevelSet::Impl& s, const char* name, openvdb::GridClass kind, const typename Grid::ValueType& background, Value&& value,
+                             On&& on) {
+  using Leaf = typename Grid::TreeType::LeafNodeType;
+  auto grid = Grid::create(background);
+  grid->setName(name);
+  grid->setGridClass(kind);
+  grid->setSaveFloatAsHalf(true);
+  auto transform = openvdb::math::Transform::createLinearTransform(s.voxel);
+  const Vec3& o = s.particles.origin();
+  transform->postTranslate(openvdb::Vec3d(o.x(), o.y(), o.z()));
+  grid->setTransform(transform);
+
+  std::vector<Leaf*> leaves(s.blocks.size());
+  parallel_for(
+      s.blocks.size(),
+      [&](std::size_t b) {
+        const BlockCoord& c = s.blocks.coords()[b];
+        auto* leaf = new Leaf(openvdb::Coord(kSide * c[0], kSide * c[1], kSide * c[2]), background, false);
+        for (std::size_t v = 0; v < kVoxels; ++v) {
+          const auto at = static_cast<openvdb::Index>(v);
+          leaf->setValueOnly(at, value(b * kVoxels + v));
+          leaf->setActiveState(at, on(b * kVoxels + v));
+        }
+        leaves[b] = leaf;
+      },
+      16);
+  for (Leaf* leaf : leaves) grid->tree().addLeaf(leaf);
+  grid->pruneGrid();
+  return grid;
+}
+
+openvdb::GridPtrVec grids_of(const LevelSet::Impl& s) {
+  ZONE("skin.vdb_grids");
+  const Field distance = distances(s.blocks, s.outside, s.phi, kBand);
+  const float h = static_cast<float>(s.voxel);
+  openvdb::GridPtrVec grids;
+  grids.push_back(make_grid<openvdb::FloatGrid>(
+      s, "surface", openvdb::GRID_LEVEL_SET, kBand * h, [&](std::size_t i) { return distance[i] * h; },
+      [&](std::size_t i) { return std::abs(distance[i]) < kBand; }));
+  grids.push_back(make_grid<openvdb::FloatGrid>(
+      s, "density", openvdb::GRID_FOG_VOLUME, 0.0f, [&](std::size_t i) { return std::clamp(0.5f - distance[i], 0.0f, 1.0f); },
+      [&](std::size_t i) { return distance[i] < 0.5f; }));
+
+  // The carried numbers where they are wanted.
+  const ParticleGrid::Carried& carried = s.particles.carried();
+  if (s.blocks.size() > 0 && carried.temperature < 0 && carried.velocity < 0) return grids;
+  const auto wanted = [&](std::size_t i) { return distance[i] < 2; };
+  std::vector<Index> row(distance.size(), kNone);
+  std::vector<Vec3> points;
+  for (std::size_t i = 0; i < distance.size(); ++i) {
+    if (!wanted(i)) continue;
+    row[i] = static_cast<Index>(points.size());
+    const BlockCoord& c = s.blocks.coords()[i / kVoxels];
+    const std::size_t v = i % kVoxels;
+    points.emplace_back(kSide * c[0] + static_cast<int>(v >> 6), kSide * c[1] + static_cast<int>((v >> 3) & 7), kSide * c[2] + static_cast<int>(v & 7));
+  }
+  const std::vector<float> values = points.empty() ? std::vector<float>{} : carried_at(s, std::move(points));
+  const auto at = [&](std::size_t i, int offset) { return values[row[i] * static_cast<std::size_t>(carried.width) + static_cast<std::size_t>(offset)]; };
+  if (carried.temperature >= 0 || s.blocks.size() == 0)
+    grids.push_back(make_grid<openvdb::FloatGrid>(
+        s, "temperature", openvdb::GRID_FOG_VOLUME, 0.0f, [&](std::size_t i) { return wanted(i) ? at(i, carried.temperature) : 0.0f; }, wanted));
+  if (carried.velocity >= 0 || s.blocks.size() == 0) {
+    auto velocity = make_grid<openvdb::Vec3SGrid>(
+        s, "velocity", openvdb::GRID_UNKNOWN, openvdb::Vec3s(0),
+        [&](std::size_t i) {
+          if (!wanted(i)) return openvdb::Vec3s(0);
+          return openvdb::Vec3s(at(i, carried.velocity), at(i, carried.velocity + 1), at(i, carried.velocity + 2));
+        },
+        wanted);
+    velocity->setVectorType(openvdb::VEC_CONTRAVARIANT_RELATIVE);
+    velocity->setIsInWorldSpace(true);
+    grids.push_back(velocity);
+  }
+  return grids;
+}
+
+}  // namespace
+
+void write_vdb(const fs::path& file, const LevelSet& surface, const std::vector<std::pair<std::string, std::string>>& metadata) {
+  ZONE("skin.write_vdb");
+  openvdb::initialize();
+  const openvdb::GridPtrVec grids = grids_of(surface.impl());
+  openvdb::MetaMap meta;
+  for (const auto& [key, value] : metadata) meta.insertMeta(key, openvdb::StringMetadata(value));
+
+  AtomicFile out(file);
+  try {
+    openvdb::io::File vdb(out.temporary().string());
+    vdb.setCompression(openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK);
+    vdb.write(grids, meta);
+    vdb.close();
+  } catch (const std::exception& e) {
+    throw std::runtime_error(fmt::format("{}: cannot write: {}", file.string(), brief(e.what())));
+  }
+
+  // OpenVDB does not look whether its bytes arrived. After the first that did not its stream is closed to all others, the
+  // table of contents included, so that a file with a sound table is whole.
+  std::vector<std::string> names;
+  try {
+    names = check_vdb_layout(out.temporary());
+  } catch (const InputError&) {
+  }
+  if (names.size() != grids.size()) throw ResourceError(fmt::format("{}: what was written does not read back: is the disk full?", file.string()));
+  out.commit();
+}
+
+std::vector<std::string> describe_vdb(const fs::path& file) {
+  check_vdb_layout(file);
+  openvdb::initialize();
+  std::vector<std::string> lines;
+  try {
+    openvdb::io::File in(file.string());
+    in.open(false);
+    // Headers only: what the writer noted of its grids, not the voxels themselves.
+    const openvdb::GridPtrVecPtr grids = in.readAllGridMetadata();
+    for (const openvdb::GridBase::Ptr& grid : *grids) {
+      std::string line = fmt::format("{}: {}, {}, voxel {:.6g} m", brief(grid->getName().c_str()),
+                                     openvdb::GridBase::gridClassToMenuName(grid->getGridClass()), brief(grid->valueType().c_str()), grid->voxelSize().x());
+      if (const auto count = grid->getMetadata<openvdb::Int64Metadata>(openvdb::GridBase::META_FILE_VOXEL_COUNT))
+        line += fmt::format(", {} active voxels", count->value());
+      const auto min = grid->getMetadata<openvdb::Vec3IMetadata>(openvdb::GridBase::META_FILE_BBOX_MIN);
+      const auto max = grid->getMetadata<openvdb::Vec3IMetadata>(openvdb::GridBase::META_FILE_BBOX_MAX);
+      if (min && max && min->value().x() <= max->value().x()) {
+        const openvdb::Vec3d low = grid->indexToWorld(openvdb::Coord(min->value())), high = grid->indexToWorld(openvdb::Coord(max->value()));
+        line += fmt::format(", bounds ({:.6g}, {:.6g}, {:.6g}) to ({:.6g}, {:.6g}, {:.6g})", low.x(), low.y(), low.z(), high.x(), high.y(), high.z());
+      }
+      lines.push_back(std::move(line));
+    }
+  } catch (const std::exception& e) {
+    throw InputError(Place{file.string()}, fmt::format("damaged OpenVDB file: {}", brief(e.what())));
+  }
+  return lines;
+}
+
+}  // namespace effuse::skin

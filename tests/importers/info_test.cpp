@@ -1,0 +1,85 @@
+#include "importers/info.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "importers/terrain/depressions.h"
+#include "tests/importers/test_files.h"
+
+namespace effuse::importers {
+namespace {
+
+std::string all(const std::filesystem::path& file) {
+  std::string text;
+  for (const std::string& line : describe_file(file)) text += line + "\n";
+  return text;
+}
+
+TEST(DescribeFile, AVolcanoIsAGridWithOneDeepCrater) {
+  const std::string text = all(EFFUSE_SOURCE_DIR "/samples/scenes/maunga-whau.asc");
+  EXPECT_TRUE(contains(text, "61 x 87 posts, 10 x 10 m apart: 600 x 860 m")) << text;
+  EXPECT_TRUE(contains(text, "heights: 94 to 195 m")) << text;
+  EXPECT_TRUE(contains(text, "holes: none")) << text;
+  EXPECT_TRUE(contains(text, "New_Zealand_Map_Grid")) << text;
+  EXPECT_TRUE(contains(text, "local origin: 2667405, 6478705, 0")) << text;
+  EXPECT_TRUE(contains(text, "20 m deep, floor 148 m, spills at 168 m")) << text;
+}
+
+TEST(DescribeFile, AMeshTellsVolumeOnlyWhenItEnclosesOne) {
+  const TestFolder folder;
+  const std::string corners = "v 0 0 0\nv 2 0 0\nv 0 3 0\nv 0 0 4\n";
+  const std::string closed = all(folder.write("closed.obj", corners + "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"));
+  EXPECT_TRUE(contains(closed, "closed")) << closed;
+  EXPECT_TRUE(contains(closed, "volume 4 m3")) << closed;
+  EXPECT_TRUE(contains(closed, "size: 2 x 3 x 4 m")) << closed;
+  const std::string open = all(folder.write("open.obj", corners + "f 1 3 2\nf 1 2 4\nf 2 3 4\n"));
+  EXPECT_FALSE(contains(open, "volume")) << open;
+}
+
+TEST(DescribeFile, ASceneTellsItsNameEffectsAndTables) {
+  const TestFolder folder;
+  const std::string text = all(folder.write("x.toml", "name = \"flank\"\neffects = [\"lava\", \"skin\"]\n[lava]\n[[vents]]\nr = 1\n"));
+  EXPECT_TRUE(contains(text, "scene: flank")) << text;
+  EXPECT_TRUE(contains(text, "effects: lava, skin")) << text;
+  EXPECT_TRUE(contains(text, "tables: lava, vents")) << text;
+}
+
+TEST(DescribeFile, AFileNobodyReadsNamesWhatIsRead) {
+  const TestFolder folder;
+  const std::string told = refusal([&] { describe_file(folder.write("notes.xyzzy", "hello")); });
+  EXPECT_TRUE(contains(told, ".xyzzy")) << told;
+  EXPECT_TRUE(contains(told, ".obj")) << told;
+  EXPECT_TRUE(contains(told, ".asc")) << told;
+  EXPECT_TRUE(contains(refusal([&] { describe_file(folder.path() / "none.toml"); }), "no such file"));
+}
+
+TEST(ClosedDepressions, ABowlInAPlainSpillsAtItsLowestRim) {
+  // A plain at 10 m with a rim at 12 m that has a notch at 11 m around a floor at 5 m.
+  const int n = 9;
+  std::vector<Real> z(n * n, 10);
+  for (int j = 2; j <= 6; ++j)
+    for (int i = 2; i <= 6; ++i) z[static_cast<std::size_t>(j * n + i)] = (i == 2 || i == 6 || j == 2 || j == 6) ? 12 : 7;
+  z[4 * n + 4] = 5;
+  z[4 * n + 6] = 11;
+  const std::vector<Depression> found = closed_depressions(geometry::HeightField(Vec2(100, 200), Vec2(2, 3), n, n, z));
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].floor, 5);
+  EXPECT_EQ(found[0].spill, 11);
+  EXPECT_EQ(found[0].posts, 9u);
+  EXPECT_DOUBLE_EQ(found[0].volume, (8 * 4 + 6) * 2 * 3.0);
+  EXPECT_EQ(found[0].lowest, Vec2(100 + 4 * 2, 200 + 4 * 3));
+}
+
+TEST(ClosedDepressions, WaterLeavesThroughAHoleInTheData) {
+  const int n = 7;
+  std::vector<Real> z(n * n, 10);
+  z[3 * n + 3] = 4;
+  EXPECT_EQ(closed_depressions(geometry::HeightField(Vec2(0, 0), Vec2(1, 1), n, n, z)).size(), 1u);
+  z[3 * n + 4] = std::nan("");
+  EXPECT_TRUE(closed_depressions(geometry::HeightField(Vec2(0, 0), Vec2(1, 1), n, n, z)).empty());
+}
+
+}  // namespace
+}  // namespace effuse::importers

@@ -1,0 +1,3 @@
+int answer();
+
+int answer() { return 42; }

@@ -1,0 +1,127 @@
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <array>
+#include <csignal>
+#include <cstdio>
+#include <fstream>
+
+#include <fmt/format.h>
+
+#include "geometry/base/error.h"
+#include "geometry/base/files.h"
+#include "skin/surface/level_set.h"
+#include "tests/skin/surface/shapes.h"
+
+namespace effuse::skin {
+namespace {
+
+namespace fs = std::filesystem;
+using testing_shapes::Cloud;
+using testing_shapes::cube;
+using testing_shapes::fill;
+
+class Vdb : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() / fmt::format("effuse_vdb_test_{}_{}", ::getpid(), testing::UnitTest::GetInstance()->current_test_info()->name());
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+  fs::path folder_;
+
+  static LevelSet ball() {
+    const Cloud cloud = fill(cube(4), 1, [](const Vec3& p) { return p.norm() < 3.8; });
+    LevelSetOptions options;
+    options.spacing = 1;
+    return build_level_set(cloud.points(), cloud.volume(), nullptr, options);
+  }
+};
+
+bool starts_with(const std::vector<std::string>& lines, const std::string& start) {
+  for (const std::string& line : lines)
+    if (line.rfind(start, 0) == 0) return true;
+  return false;
+}
+
+TEST_F(Vdb, HoldsTheFourGridsWithTheirClasses) {
+  const fs::path file = folder_ / "ball.0001.vdb";
+  write_vdb(file, ball(), {{"crs", "EPSG:27200"}, {"origin", "1 2 3"}});
+  const std::vector<std::string> lines = describe_vdb(file);
+  ASSERT_EQ(lines.size(), 4u);
+  EXPECT_TRUE(starts_with(lines, "surface: Level Set, float, voxel 0.5 m, "));
+  EXPECT_TRUE(starts_with(lines, "density: Fog Volume, float, voxel 0.5 m, "));
+  EXPECT_TRUE(starts_with(lines, "temperature: Fog Volume, float, voxel 0.5 m, "));
+  EXPECT_TRUE(starts_with(lines, "velocity: "));
+  // Nothing else is left in the folder.
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 1);
+}
+
+TEST_F(Vdb, OfAnEmptyLevelSetIsValid) {
+  const fs::path file = folder_ / "empty.vdb";
+  write_vdb(file, LevelSet{}, {});
+  const std::vector<std::string> lines = describe_vdb(file);
+  EXPECT_EQ(lines.size(), 4u);
+  EXPECT_TRUE(starts_with(lines, "surface: Level Set, float, voxel 1 m, 0 active voxels"));
+}
+
+TEST_F(Vdb, IsReadByOpenVdbsOwnPrinter) {
+  if (std::system("command -v vdb_print > /dev/null 2>&1") != 0) GTEST_SKIP() << "vdb_print (package libopenvdb-tools) is not installed";
+  const fs::path file = folder_ / "ball.vdb";
+  write_vdb(file, ball(), {{"crs", "EPSG:27200"}});
+  // It exits 0 on errors: its words count.
+  std::FILE* pipe = ::popen(fmt::format("vdb_print -m '{}' 2>&1", file.string()).c_str(), "r");
+  ASSERT_NE(pipe, nullptr);
+  std::string words;
+  std::array<char, 4096> buffer;
+  while (const std::size_t got = std::fread(buffer.data(), 1, buffer.size(), pipe)) words.append(buffer.data(), got);
+  ::pclose(pipe);
+  for (const char* wanted : {"surface", "density", "temperature", "velocity", "level set", "fog volume", "EPSG:27200"})
+    EXPECT_NE(words.find(wanted), std::string::npos) << wanted << " is not in:\n" << words;
+}
+
+TEST_F(Vdb, WhenTheDiskIsFullThereIsAnErrorAndNoFile) {
+  const fs::path file = folder_ / "full.vdb";
+  const LevelSet surface = ball();
+  // A limit on the size of files stands in for the end of the disk; the signal it comes with must not end the test.
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  for (const rlim_t limit : {rlim_t{0}, rlim_t{1000}, rlim_t{20000}}) {
+    rlimit small = before;
+    small.rlim_cur = limit;
+    ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &small), 0);
+    EXPECT_THROW(write_vdb(file, surface, {}), ResourceError) << limit;
+    ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
+    EXPECT_TRUE(fs::is_empty(folder_)) << limit;
+  }
+  std::signal(SIGXFSZ, handler);
+  write_vdb(file, surface, {});
+  EXPECT_GT(fs::file_size(file), 20000u) << "the limits above would not have been met";
+}
+
+TEST_F(Vdb, BrokenFilesAreErrorsOfOneShortSentence) {
+  const fs::path file = folder_ / "ball.vdb", broken = folder_ / "broken.vdb";
+  write_vdb(file, ball(), {});
+  const std::string bytes = read_file(file);
+  // Cut anywhere: never read as whole.
+  for (std::size_t k = 0; k < 60; ++k) {
+    const std::size_t size = k < 20 ? k : bytes.size() * k / 60;
+    std::ofstream(broken, std::ios::binary) << bytes.substr(0, size);
+    try {
+      describe_vdb(broken);
+      ADD_FAILURE() << "read " << size << " of " << bytes.size() << " bytes as if whole";
+    } catch (const InputError& e) {
+      EXPECT_LT(std::string(e.what()).size(), 500u);
+      EXPECT_NE(std::string(e.what()).find("broken.vdb"), std::string::npos);
+    }
+  }
+  EXPECT_THROW(describe_vdb(folder_ / "absent.vdb"), InputError);
+  EXPECT_THROW(describe_vdb(folder_), InputError);
+  std::ofstream(broken, std::ios::binary) << "ply\nformat ascii 1.0\n";
+  EXPECT_THROW(describe_vdb(broken), InputError);
+}
+
+}  // namespace
+}  // namespace effuse::skin
