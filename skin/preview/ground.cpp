@@ -96,6 +96,8 @@ void add_apron(TriMesh& mesh, Real radius, Real base) {
   for (const Edge& e : edges)
     for (const Index v : e) slot.emplace(v, slot.size());
   const std::size_t n = slot.size();
+  std::vector<std::array<std::size_t, 2>> links;
+  for (const Edge& e : edges) links.push_back({slot[e[0]], slot[e[1]]});
   std::vector<Vec3> start(n);
   for (const auto& [v, s] : slot) start[s] = mesh.positions[v];
   std::vector<Real> height(n), blurred(n), count(n);
@@ -111,8 +113,7 @@ void add_apron(TriMesh& mesh, Real radius, Real base) {
     for (int pass = 0; pass < 1 + k / 2; ++pass) {
       blurred = height;
       std::fill(count.begin(), count.end(), 1);
-      for (const Edge& e : edges) {
-        const std::size_t a = slot[e[0]], b = slot[e[1]];
+      for (const auto& [a, b] : links) {
         blurred[a] += height[b];
         blurred[b] += height[a];
         count[a] += 1;
@@ -134,8 +135,7 @@ void add_apron(TriMesh& mesh, Real radius, Real base) {
       next[s] = static_cast<Index>(mesh.positions.size());
       mesh.positions.emplace_back(plane.x(), plane.y(), z);
     }
-    for (const Edge& e : edges) {
-      const std::size_t a = slot[e[0]], b = slot[e[1]];
+    for (const auto& [a, b] : links) {
       mesh.triangles.push_back({ring[b], ring[a], next[a]});
       mesh.triangles.push_back({ring[b], next[a], next[b]});
     }

@@ -31,7 +31,9 @@ Field distances(const Blocks& blocks, float outside, const Field& phi, float ban
   Field distance(phi.size());
   std::vector<std::uint8_t> fixed(phi.size(), 0);
 
-  // Voxels with a neighbour across the surface: phi / |grad phi|, no farther than the crossing on any edge.
+  // Voxels with a neighbour across the surface. Where an edge along axis a crosses at c_a, a plane with normal n is c_a |n_a|
+  // away; the crossings of an edge's two ends add up to it, so that the zero level stays. Axes that the plane crosses squarely
+  // count most.
   parallel_for(
       blocks.size(),
       [&](std::size_t b) {
@@ -40,15 +42,28 @@ Field distances(const Blocks& blocks, float outside, const Field& phi, float ban
         for (std::size_t v = 0; v < kVoxels; ++v) {
           const float* c = p + ((v >> 6) + 1) * 100 + (((v >> 3) & 7) + 1) * 10 + (v & 7) + 1;
           const bool inside = c[0] < 0;
-          float crossing = 2, gradient2 = 0;
-          for (const int a : kAxis) {
-            for (const float q : {c[a], c[-a]})
-              if ((q < 0) != inside) crossing = std::min(crossing, c[0] / (c[0] - q));
-            gradient2 += (c[a] - c[-a]) * (c[a] - c[-a]) / 4;
+          constexpr float kNoCrossing = 2;
+          float crossing[3], slope[3], nearest = kNoCrossing, slope2 = 1e-6f;
+          for (std::size_t a = 0; a < 3; ++a) {
+            crossing[a] = kNoCrossing;
+            for (const float q : {c[kAxis[a]], c[-kAxis[a]]})
+              if ((q < 0) != inside) crossing[a] = std::min(crossing[a], c[0] / (c[0] - q));
+            nearest = std::min(nearest, crossing[a]);
+            slope[a] = std::abs(c[kAxis[a]] - c[-kAxis[a]]) / 2;
+            slope2 += slope[a] * slope[a];
           }
           const std::size_t at = b * kVoxels + v;
-          fixed[at] = crossing <= 1;
-          const float size = fixed[at] ? std::min(crossing, std::abs(c[0]) / std::sqrt(std::max(gradient2, 1e-6f))) : band;
+          fixed[at] = nearest <= 1;
+          float size = band;
+          if (fixed[at]) {
+            float sum = 0, weights = 0;
+            for (std::size_t a = 0; a < 3; ++a)
+              if (crossing[a] <= 1) {
+                sum += slope[a] * slope[a] * crossing[a] * slope[a] / std::sqrt(slope2);
+                weights += slope[a] * slope[a];
+              }
+            size = weights > 0.01f * slope2 ? std::min(nearest, sum / weights) : nearest;
+          }
           distance[at] = inside ? -size : size;
         }
       },

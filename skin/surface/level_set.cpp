@@ -39,7 +39,7 @@ LevelSet build_level_set(const geometry::Points& points, Real volume, const geom
   const float radius = static_cast<float>(options.radius) * d;
   s.reach = static_cast<float>(options.influence) * d;
   s.outside = s.reach - radius;
-  s.lift = d / 2;
+  s.lift = 0.75f * d;  // the lowest particles float half a spacing over the ground, on rough ground up to one and more
   s.report.particles = points.size();
   s.particles = ParticleGrid(points, s.voxel, std::max(1.0, s.reach / 2.0));
   if (points.size() == 0) return surface;

@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 
 #include "geometry/base/error.h"
 #include "geometry/base/files.h"
+#include "geometry/base/hash.h"
 #include "geometry/base/parallel.h"
 #include "geometry/base/zones.h"
 #include "skin/surface/level_set_impl.h"
@@ -20,6 +22,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr float kBand = 3;  // [voxels] half width of the level set
+constexpr int kNodes = 5;   // of a block at every second voxel: 0, 2, 4, 6, 8
 
 /// What a package said, fit for a line: OpenVDB's words on a broken file can be hundreds of megabytes of its bytes.
 std::string brief(const char* words) {
@@ -74,21 +77,33 @@ openvdb::GridPtrVec grids_of(const LevelSet::Impl& s) {
       s, "density", openvdb::GRID_FOG_VOLUME, 0.0f, [&](std::size_t i) { return std::clamp(0.5f - distance[i], 0.0f, 1.0f); },
       [&](std::size_t i) { return distance[i] < 0.5f; }));
 
-  // The carried numbers where they are wanted.
+  // Temperature and velocity inside and near the surface, from every second voxel: their averages reach over eight.
   const ParticleGrid::Carried& carried = s.particles.carried();
   if (s.blocks.size() > 0 && carried.temperature < 0 && carried.velocity < 0) return grids;
   const auto wanted = [&](std::size_t i) { return distance[i] < 2; };
-  std::vector<Index> row(distance.size(), kNone);
-  std::vector<Vec3> points;
-  for (std::size_t i = 0; i < distance.size(); ++i) {
-    if (!wanted(i)) continue;
-    row[i] = static_cast<Index>(points.size());
-    const BlockCoord& c = s.blocks.coords()[i / kVoxels];
-    const std::size_t v = i % kVoxels;
-    points.emplace_back(kSide * c[0] + static_cast<int>(v >> 6), kSide * c[1] + static_cast<int>((v >> 3) & 7), kSide * c[2] + static_cast<int>(v & 7));
+  std::vector<Index> first_node(s.blocks.size(), kNone);
+  std::vector<Vec3> nodes;
+  for (std::size_t b = 0; b < s.blocks.size(); ++b) {
+    const float* d = &distance[b * kVoxels];
+    if (*std::min_element(d, d + kVoxels) >= 2) continue;
+    first_node[b] = static_cast<Index>(nodes.size());
+    const BlockCoord& c = s.blocks.coords()[b];
+    for (int i = 0; i < kNodes; ++i)
+      for (int j = 0; j < kNodes; ++j)
+        for (int k = 0; k < kNodes; ++k) nodes.emplace_back(kSide * c[0] + 2 * i, kSide * c[1] + 2 * j, kSide * c[2] + 2 * k);
   }
-  const std::vector<float> values = points.empty() ? std::vector<float>{} : carried_at(s, std::move(points));
-  const auto at = [&](std::size_t i, int offset) { return values[row[i] * static_cast<std::size_t>(carried.width) + static_cast<std::size_t>(offset)]; };
+  const std::vector<float> values = nodes.empty() ? std::vector<float>{} : carried_at(s, std::move(nodes));
+  const std::size_t width = static_cast<std::size_t>(carried.width);
+  // Trilinear: a voxel lies on a node or halfway between two in each direction.
+  const auto at = [&](std::size_t index, int offset) {
+    const std::size_t v = index % kVoxels, i = v >> 6, j = (v >> 3) & 7, k = v & 7;
+    float sum = 0, used = 0;
+    for (std::size_t x = i / 2; x <= (i + 1) / 2; ++x)
+      for (std::size_t y = j / 2; y <= (j + 1) / 2; ++y)
+        for (std::size_t z = k / 2; z <= (k + 1) / 2; ++z, ++used)
+          sum += values[(first_node[index / kVoxels] + (x * kNodes + y) * kNodes + z) * width + static_cast<std::size_t>(offset)];
+    return sum / used;
+  };
   if (carried.temperature >= 0 || s.blocks.size() == 0)
     grids.push_back(make_grid<openvdb::FloatGrid>(
         s, "temperature", openvdb::GRID_FOG_VOLUME, 0.0f, [&](std::size_t i) { return wanted(i) ? at(i, carried.temperature) : 0.0f; }, wanted));
@@ -105,6 +120,25 @@ openvdb::GridPtrVec grids_of(const LevelSet::Impl& s) {
     grids.push_back(velocity);
   }
   return grids;
+}
+
+/// OpenVDB gives every file a random name of its own (a UUID). Ours is the hash of what the file holds, so that the same
+/// frame is the same bytes. It stands after the magic number, the version of the format, two of the library and a flag.
+void name_by_content(const fs::path& file) {
+  constexpr std::streamoff kAt = 8 + 3 * 4 + 1;
+  constexpr std::size_t kLength = 36;
+  std::string bytes = read_file(file);
+  // A layout we do not know: better a random name than a damaged file.
+  if (bytes.size() < kAt + kLength || bytes[kAt + 8] != '-' || bytes[kAt + 13] != '-' || bytes[kAt + 18] != '-' || bytes[kAt + 23] != '-') return;
+  bytes.replace(kAt, kLength, kLength, '0');
+  StateHash first, second;
+  first.add(std::string_view(bytes));
+  second.add(first.value());
+  const std::string hex = first.hex() + second.hex();
+  const std::string uuid = fmt::format("{}-{}-4{}-8{}-{}", hex.substr(0, 8), hex.substr(8, 4), hex.substr(12, 3), hex.substr(15, 3), hex.substr(18, 12));
+  std::fstream out(file, std::ios::in | std::ios::out | std::ios::binary);
+  out.seekp(kAt);
+  out.write(uuid.data(), kLength);
 }
 
 }  // namespace
@@ -134,6 +168,7 @@ void write_vdb(const fs::path& file, const LevelSet& surface, const std::vector<
   } catch (const InputError&) {
   }
   if (names.size() != grids.size()) throw ResourceError(fmt::format("{}: what was written does not read back: is the disk full?", file.string()));
+  name_by_content(out.temporary());
   out.commit();
 }
 

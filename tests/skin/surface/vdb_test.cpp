@@ -1,8 +1,11 @@
 #include <gtest/gtest.h>
+#include <openvdb/io/File.h>
+#include <openvdb/openvdb.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
 #include <array>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <fstream>
@@ -56,6 +59,65 @@ TEST_F(Vdb, HoldsTheFourGridsWithTheirClasses) {
   EXPECT_TRUE(starts_with(lines, "velocity: "));
   // Nothing else is left in the folder.
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 1);
+}
+
+TEST_F(Vdb, ValuesReadBackAreDistancesTemperaturesAndVelocities) {
+  // A ball of radius 8 (16 voxels), far enough from the origin that single precision would show.
+  const Vec3 centre(400000, 5900000, 300);
+  const Cloud ball_at_home = fill(cube(9), 1, [](const Vec3& p) { return p.norm() < 7.6; }, 0.05);
+  Cloud cloud;
+  for (const Vec3& p : ball_at_home.x) {
+    cloud.add(p + centre, 1);
+    cloud.temperature.back() = 1200 + 10 * p.x();
+    cloud.velocity.back() = Vec3(1, p.y(), -2);
+  }
+  LevelSetOptions options;
+  options.spacing = 1;
+  const fs::path file = folder_ / "ball.vdb";
+  write_vdb(file, build_level_set(cloud.points(), 4.0 / 3 * kPi * 512, nullptr, options), {{"crs", "EPSG:27200"}});
+
+  openvdb::initialize();
+  openvdb::io::File in(file.string());
+  in.open(false);
+  EXPECT_EQ(in.getMetadata()->metaValue<std::string>("crs"), "EPSG:27200");
+  const auto scalar = [&](const char* name) { return openvdb::gridPtrCast<openvdb::FloatGrid>(in.readGrid(name)); };
+  const auto surface = scalar("surface"), density = scalar("density"), temperature = scalar("temperature");
+  const auto velocity = openvdb::gridPtrCast<openvdb::Vec3SGrid>(in.readGrid("velocity"));
+  const auto local = [&](const openvdb::Coord& c) {
+    const openvdb::Vec3d w = surface->indexToWorld(c);
+    return Vec3(w.x() - centre.x(), w.y() - centre.y(), w.z() - centre.z());
+  };
+
+  EXPECT_EQ(surface->background(), 1.5f);
+  double worst = 0, squares = 0, n = 0;
+  for (auto v = surface->cbeginValueOn(); v; ++v, ++n) {
+    ASSERT_TRUE(v.isVoxelValue());
+    const double error = *v - (local(v.getCoord()).norm() - 8);
+    worst = std::max(worst, std::abs(error));
+    squares += error * error;
+  }
+  EXPECT_GT(n, 4 * kPi * 32 * 32 * 0.6);  // six voxels deep, radius 16: 19000
+  EXPECT_LT(worst, 0.6);                   // half a spacing: the particles' lattice is that rough
+  EXPECT_LT(std::sqrt(squares / n), 0.2);
+  // Deep inside and far outside: no voxel, the right sign.
+  const openvdb::Coord middle = surface->transform().worldToIndexCellCentered(openvdb::Vec3d(centre.x(), centre.y(), centre.z()));
+  EXPECT_EQ(surface->tree().getValue(middle), -1.5f);
+  EXPECT_FALSE(surface->tree().isValueOn(middle));
+  EXPECT_EQ(surface->tree().getValue(middle.offsetBy(200)), 1.5f);
+
+  EXPECT_EQ(density->tree().getValue(middle), 1);
+  double volume = 0;
+  for (auto v = density->cbeginValueOn(); v; ++v) volume += static_cast<double>(*v) * static_cast<double>(v.getVoxelCount()) / 8;
+  EXPECT_NEAR(volume / (4.0 / 3 * kPi * 512), 1, 0.02);
+
+  // Linear fields come back as they were, up to half floats and, at the rim, the averages' shift inwards.
+  for (auto v = temperature->cbeginValueOn(); v; ++v) {
+    const Vec3 p = local(v.getCoord());
+    const double shift = p.norm() < 5.5 ? 0.1 : 2.0;
+    ASSERT_NEAR(*v, 1200 + 10 * p.x(), 10 * shift + 1) << p.transpose();
+    ASSERT_NEAR(velocity->tree().getValue(v.getCoord()).y(), p.y(), shift + 0.01);
+    ASSERT_NEAR(velocity->tree().getValue(v.getCoord()).z(), -2, 1e-3);
+  }
 }
 
 TEST_F(Vdb, OfAnEmptyLevelSetIsValid) {

@@ -1,0 +1,274 @@
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "geometry/base/files.h"
+
+/// The program as its users meet it: exit codes, messages, folders, resumed runs.
+namespace effuse {
+namespace {
+
+namespace fs = std::filesystem;
+using Arguments = std::vector<std::string>;
+
+const fs::path kScenes = fs::path(EFFUSE_SOURCE_DIR) / "samples" / "scenes";
+
+/// A folder of the test's own, removed at its end.
+class ProgramTest : public testing::Test {
+ protected:
+  ProgramTest() {
+    const testing::TestInfo* info = testing::UnitTest::GetInstance()->current_test_info();
+    folder_ = fs::temp_directory_path() / fmt::format("effuse.{}.{}.{}", info->test_suite_name(), info->name(), ::getpid());
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  ~ProgramTest() override { fs::remove_all(folder_); }
+
+  struct Outcome {
+    int code = -1;
+    std::string out, err;
+  };
+
+  pid_t start(const Arguments& arguments, rlim_t largest_file = RLIM_INFINITY) {
+    std::vector<std::string> words = {EFFUSE_PROGRAM};
+    words.insert(words.end(), arguments.begin(), arguments.end());
+    std::vector<char*> argv;
+    for (std::string& word : words) argv.push_back(word.data());
+    argv.push_back(nullptr);
+    const std::string out = folder_ / "stdout.txt", err = folder_ / "stderr.txt";
+    const pid_t pid = ::fork();
+    if (pid == 0) {
+      if (!::freopen(out.c_str(), "w", stdout) || !::freopen(err.c_str(), "w", stderr)) ::_exit(99);
+      if (largest_file != RLIM_INFINITY) {
+        ::signal(SIGXFSZ, SIG_IGN);
+        const rlimit limit{largest_file, largest_file};
+        ::setrlimit(RLIMIT_FSIZE, &limit);
+      }
+      ::execv(argv[0], argv.data());
+      ::_exit(98);
+    }
+    return pid;
+  }
+
+  Outcome wait(pid_t pid) {
+    int status = 0;
+    ::waitpid(pid, &status, 0);
+    Outcome outcome{WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status), read_file(folder_ / "stdout.txt"), read_file(folder_ / "stderr.txt")};
+    return outcome;
+  }
+
+  Outcome effuse(const Arguments& arguments) { return wait(start(arguments)); }
+
+  fs::path write(const std::string& name, const std::string& text) {
+    write_file(folder_ / name, text);
+    return folder_ / name;
+  }
+
+  /// The gully scene, made short and coarse.
+  static Arguments run_gully(const fs::path& out, int frames, const Arguments& more = {}) {
+    Arguments arguments = {"run", kScenes / "lava.toml", "-o", out, "--frames", std::to_string(frames), "--set", "lava.spacing=1.2 m", "--set", "preview.pictures=false",
+                           "--set", "output.checkpoint_every=3"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  }
+
+  fs::path folder_;
+};
+
+nlohmann::json run_json(const fs::path& folder) { return nlohmann::json::parse(read_file(folder / "run.json")); }
+
+/// Paths below folder/frames (and preview) and what they hold.
+std::map<std::string, std::string> frame_files(const fs::path& folder) {
+  std::map<std::string, std::string> files;
+  for (const char* part : {"frames", "preview"})
+    if (fs::exists(folder / part))
+      for (const fs::directory_entry& entry : fs::directory_iterator(folder / part)) files[part + ("/" + entry.path().filename().string())] = read_file(entry.path());
+  return files;
+}
+
+void expect_same_files(const fs::path& a, const fs::path& b, std::size_t at_least) {
+  const auto x = frame_files(a), y = frame_files(b);
+  EXPECT_GE(x.size(), at_least);
+  ASSERT_EQ(x.size(), y.size());
+  for (const auto& [name, bytes] : x) {
+    ASSERT_TRUE(y.contains(name)) << name;
+    EXPECT_TRUE(bytes == y.at(name)) << name << " differs: " << bytes.size() << " and " << y.at(name).size() << " bytes";
+  }
+}
+
+std::size_t count(const std::string& text, const std::string& what) {
+  std::size_t n = 0;
+  for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + what.size())) ++n;
+  return n;
+}
+
+TEST_F(ProgramTest, ChecksASceneAndSaysWhatItWouldCost) {
+  const Outcome outcome = effuse({"check", kScenes / "maunga-whau.toml", "--json"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const auto j = nlohmann::json::parse(outcome.out);
+  EXPECT_TRUE(j.at("ok").get<bool>());
+  EXPECT_GT(j.at("effects").at(0).at("particles").get<double>(), 8000);
+  EXPECT_GT(j.at("seconds").get<double>(), 0);
+}
+
+TEST_F(ProgramTest, ReportsAllFiveFaultsOfASceneWithLineAndColumn) {
+  const fs::path scene = write("five.toml", R"(name = "Five faults"
+[film]
+frames = "ten"
+[terrain]
+file = "nowhere.asc"
+[lava]
+spacing = "2 kg"
+viscsity = { hot = 1 }
+[[lava.vent]]
+at = [10, 10]
+width = "4 m"
+rate = "-3 m3/s"
+)");
+  const Outcome outcome = effuse({"check", scene});
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_TRUE(outcome.out.empty()) << outcome.out;
+  EXPECT_EQ(count(outcome.err, "error: "), 5u) << outcome.err;
+  for (const char* where : {"five.toml:3:", "five.toml:5:", "five.toml:7:", "five.toml:8:", "five.toml:12:"}) EXPECT_EQ(count(outcome.err, where), 1u) << where << "\n" << outcome.err;
+  EXPECT_NE(outcome.err.find("did you mean"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("viscosity"), std::string::npos) << outcome.err;
+
+  const Outcome json = effuse({"check", scene, "--json"});
+  EXPECT_EQ(json.code, 2);
+  const auto j = nlohmann::json::parse(json.out);
+  ASSERT_EQ(j.at("errors").size(), 5u);
+  for (const auto& error : j.at("errors")) {
+    EXPECT_GT(error.at("line").get<int>(), 0);
+    EXPECT_GT(error.at("column").get<int>(), 0);
+  }
+}
+
+TEST_F(ProgramTest, RefusesBrokenTerrainInOneSentenceAndLeavesNoFolder) {
+  const std::string header = "ncols 3\nnrows 3\nxllcorner 0\nyllcorner 0\ncellsize 10\n";
+  write("empty.asc", "");
+  write("truncated.asc", header + "1 2 3\n4 5 6\n7");
+  write("nan.asc", header + "nan nan nan\nnan nan nan\nnan nan nan\n");
+  write("one.asc", "ncols 1\nnrows 1\nxllcorner 0\nyllcorner 0\ncellsize 10\n5\n");
+  for (const char* terrain : {"missing.asc", "empty.asc", "truncated.asc", "nan.asc", "one.asc"}) {
+    const fs::path scene = write("scene.toml", fmt::format("[film]\nframes = 2\n[terrain]\nfile = \"{}\"\n[lava]\nspacing = 1\n[[lava.vent]]\nat = [15, 15]\nwidth = 4\nrate = 1\n", terrain));
+    const Outcome outcome = effuse({"run", scene, "-o", folder_ / "out"});
+    EXPECT_EQ(outcome.code, 2) << terrain;
+    EXPECT_EQ(count(outcome.err, "\n"), 1u) << terrain << ": " << outcome.err;
+    EXPECT_NE(outcome.err.find(terrain), std::string::npos) << outcome.err;
+    EXPECT_FALSE(fs::exists(folder_ / "out")) << terrain;
+  }
+}
+
+TEST_F(ProgramTest, RefusesAVentBesideTheTerrain) {
+  const Outcome outcome = effuse({"check", kScenes / "lava.toml", "--set", "lava.vent[0].at=[500, 500]"});
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_NE(outcome.err.find("not on the terrain"), std::string::npos) << outcome.err;
+}
+
+TEST_F(ProgramTest, NamesTheNearestVerbAndRefusesAnUnknownFlag) {
+  const Outcome verb = effuse({"chekc", "x.toml"});
+  EXPECT_EQ(verb.code, 2);
+  EXPECT_NE(verb.err.find("did you mean 'check'"), std::string::npos) << verb.err;
+  EXPECT_EQ(effuse({"run", kScenes / "lava.toml", "--framse", "3"}).code, 2);
+  EXPECT_EQ(effuse({"--help"}).code, 0);
+}
+
+TEST_F(ProgramTest, GivesTheSameFramesOnOneTwoAndFourThreads) {
+  std::vector<nlohmann::json> frames;
+  for (const char* threads : {"1", "2", "4"}) {
+    const fs::path out = folder_ / threads;
+    const Outcome outcome = effuse(run_gully(out, 8, {"--threads", threads}));
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    frames.push_back(run_json(out).at("frames"));
+  }
+  EXPECT_EQ(frames[0].size(), 8u);
+  EXPECT_EQ(frames[1], frames[0]);
+  EXPECT_EQ(frames[2], frames[0]);
+  expect_same_files(folder_ / "1", folder_ / "2", 8 * 4);
+  expect_same_files(folder_ / "1", folder_ / "4", 8 * 4);
+}
+
+TEST_F(ProgramTest, KilledInTheMidstOfAFrameItGoesOnToTheSameBytes) {
+  const fs::path whole = folder_ / "whole", broken = folder_ / "broken";
+  ASSERT_EQ(effuse(run_gully(whole, 12)).code, 0);
+  const pid_t pid = start(run_gully(broken, 12));
+  // Past the checkpoint of frame 3: wait for frame 5, then kill.
+  while (!fs::exists(broken / "frames" / "lava.0005.vdb")) {
+    ASSERT_EQ(::waitpid(pid, nullptr, WNOHANG), 0) << "it ended by itself";
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  ::kill(pid, SIGKILL);
+  EXPECT_EQ(wait(pid).code, -SIGKILL);
+  const Outcome resumed = effuse(run_gully(broken, 12, {"--resume"}));
+  ASSERT_EQ(resumed.code, 0) << resumed.err;
+  EXPECT_NE(resumed.err.find("going on after frame"), std::string::npos) << resumed.err;
+  expect_same_files(whole, broken, 12 * 4);
+  EXPECT_EQ(run_json(whole).at("frames"), run_json(broken).at("frames"));
+}
+
+TEST_F(ProgramTest, InterruptedItCheckpointsAndSaysHowToGoOn) {
+  const fs::path whole = folder_ / "whole", broken = folder_ / "broken";
+  ASSERT_EQ(effuse(run_gully(whole, 10)).code, 0);
+  const pid_t pid = start(run_gully(broken, 10));
+  while (!fs::exists(broken / "frames" / "lava.0005.vdb")) {
+    ASSERT_EQ(::waitpid(pid, nullptr, WNOHANG), 0) << "it ended by itself";
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  ::kill(pid, SIGINT);
+  const Outcome outcome = wait(pid);
+  EXPECT_EQ(outcome.code, 130) << outcome.err;
+  EXPECT_NE(outcome.err.find("--resume"), std::string::npos) << outcome.err;
+  ASSERT_EQ(effuse(run_gully(broken, 10, {"--resume"})).code, 0);
+  expect_same_files(whole, broken, 10 * 4);
+}
+
+TEST_F(ProgramTest, KeepsARunUnlessForcedAndARunOfAnotherSceneFromBeingResumed) {
+  const fs::path out = folder_ / "out";
+  ASSERT_EQ(effuse(run_gully(out, 3)).code, 0);
+  const Outcome again = effuse(run_gully(out, 3));
+  EXPECT_EQ(again.code, 2);
+  EXPECT_NE(again.err.find("--resume"), std::string::npos) << again.err;
+  const Outcome other = effuse(run_gully(out, 3, {"--resume", "--set", "lava.density=2500"}));
+  EXPECT_EQ(other.code, 2);
+  EXPECT_NE(other.err.find("scene has changed"), std::string::npos) << other.err;
+  EXPECT_EQ(effuse(run_gully(out, 5, {"--resume"})).code, 0) << "more frames are no other scene";
+  EXPECT_EQ(run_json(out).at("frames").size(), 5u);
+  EXPECT_EQ(effuse(run_gully(out, 2, {"--force"})).code, 0);
+  EXPECT_EQ(frame_files(out).size(), 2u * 4);
+}
+
+TEST_F(ProgramTest, AFullDiskEndsTheRunWithCodeFiveAndNoBrokenFile) {
+  const fs::path out = folder_ / "out";
+  const Outcome outcome = wait(start(run_gully(out, 12), 60'000));
+  EXPECT_EQ(outcome.code, 5) << outcome.err;
+  for (const auto& [name, bytes] : frame_files(out)) {
+    EXPECT_EQ(name.find(".part"), std::string::npos) << name;
+    EXPECT_LE(bytes.size(), 60'000u) << name;
+  }
+}
+
+TEST_F(ProgramTest, DescribesItsOwnFiles) {
+  const fs::path out = folder_ / "out";
+  ASSERT_EQ(effuse(run_gully(out, 4)).code, 0);
+  const Outcome outcome = effuse({"info", out, out / "frames" / "skin.0004.ply", out / "frames" / "skin.0004.glb", out / "frames" / "lava.0004.vdb", out / "terrain.ply",
+                                  out / "scene.toml", kScenes / "gully.asc"});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("surface"), std::string::npos) << outcome.out;
+  EXPECT_EQ(effuse({"effects"}).code, 0);
+  // The resolved scene is a scene: it checks, and says the same again.
+  fs::copy_file(kScenes / "gully.asc", out / "gully.asc");
+  EXPECT_EQ(effuse({"check", out / "scene.toml"}).code, 0);
+}
+
+}  // namespace
+}  // namespace effuse
