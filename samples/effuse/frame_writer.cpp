@@ -76,8 +76,7 @@ FrameWriter::Result FrameWriter::write_frame(const flow::Simulation& simulation)
   if (settings_.glb) skin::write_glb(frames / numbered("skin", frame, "glb"), mesh, about);
   if (settings_.vdb) skin::write_vdb(frames / numbered("lava", frame, "vdb"), surface, about);
   if (preview_) {
-    const Real share = scene_.frames > 1 ? (frame - 1) / static_cast<Real>(scene_.frames - 1) : 0;
-    const skin::Image image = preview_->render(mesh, skin::picture_at(settings_, terrain_, share));
+    const skin::Image image = preview_->render(mesh, skin::picture_at(settings_, terrain_, frame / scene_.fps));
     skin::write_png(folder_ / "preview" / numbered("preview", frame, "png"), image);
   }
   return result;
@@ -91,10 +90,12 @@ void FrameWriter::write_contact_sheet(int frames) {
   std::vector<std::string> labels;
   for (int k = 0; k < count; ++k) {
     const int frame = count == 1 ? 1 : 1 + static_cast<int>((frames - 1) * static_cast<Real>(k) / (count - 1) + 0.5);
-    pictures.push_back(folder_ / "preview" / numbered("preview", frame, "png"));
+    const fs::path picture = folder_ / "preview" / numbered("preview", frame, "png");
+    if (!fs::exists(picture)) continue;  // a resumed run may have made its first frames without
+    pictures.push_back(picture);
     labels.push_back(fmt::format("frame {}   {:.0f} s", frame, scene_.frame_time(frame)));
   }
-  skin::write_contact_sheet(folder_ / "preview" / "contact_sheet.png", pictures, labels, 3);
+  if (!pictures.empty()) skin::write_contact_sheet(folder_ / "preview" / "contact_sheet.png", pictures, labels, 3);
 }
 
 void FrameWriter::write_manifest(int frames_done) const {

@@ -26,6 +26,14 @@ SkinSettings read_skin_settings(flow::Parameters& root) {
   detail.edge = skin.number("edge", "", detail.edge, {0.05, 10}, "length of the mesh's edges, in spacings");
   s.color.strength = skin.number("glow", "", s.color.strength, Parameters::not_negative(), "light of lava at 1200 degC, white paper in the sun is 1");
 
+  s.color.exponent = skin.number("glow_exponent", "", s.color.exponent, {0, 30}, "glow goes with this power of the temperature: 4 flat, 17 physical");
+  s.color.molten = skin.number("molten", "K", s.color.molten, Parameters::positive(), "hotter than this the lava has no crust of plates");
+  s.color.plated = skin.number("plated", "K", s.color.plated, Parameters::positive(), "cooler than this it is all plates, with cracks between");
+  s.color.plate = skin.number("plate", "K", s.color.plate, Parameters::positive(), "apparent temperature of a closed plate over hot lava");
+  s.color.crack_width = skin.number("crack_width", "", s.color.crack_width, {0, 1}, "share of the plated surface that is cracks, roughly");
+  if (s.color.plated >= s.color.molten) skin.fault("plated", "is not below molten");
+  detail.molten = s.color.molten;
+
   Parameters output = root.table("output", "what is written for each frame");
   const std::vector<std::string> formats = {"ply", "obj", "glb", "vdb"};
   const std::vector<std::size_t> wanted = output.choices("formats", formats, {0, 1, 2, 3}, "files of the skin");
@@ -53,13 +61,13 @@ SkinSettings read_skin_settings(flow::Parameters& root) {
   picture.glow_light = preview.number("glow_light", "", picture.glow_light, Parameters::not_negative(), "how much lava lights the ground");
   s.azimuth = preview.number("azimuth", "rad", -2.2, {}, "where the camera stands, counter-clockwise from east");
   s.elevation = preview.number("elevation", "rad", 0.5, {-0.2, 1.5}, "of the camera above the horizon");
-  s.turn = preview.number("turn", "rad", 0, {}, "of the camera round its target over the film");
+  s.turn = preview.number("turn", "rad/s", 0, {}, "of the camera round its target, by seconds of film");
   s.view = preview.numbers("view", "m", 3, false, "x, y in the terrain file's coordinates and radius of what the camera frames; absent: all the terrain");
   if (s.view.size() == 3 && s.view[2] <= 0) preview.fault("view", "the radius, third number, is not above 0");
   return s;
 }
 
-PreviewOptions picture_at(const SkinSettings& s, const geometry::Terrain& terrain, Real share) {
+PreviewOptions picture_at(const SkinSettings& s, const geometry::Terrain& terrain, Real film_time) {
   Box3 box = terrain.bounds();
   if (s.view.size() == 3) {
     const Vec2 at = Vec2(s.view[0], s.view[1]) - terrain.georeference().origin.head<2>();
@@ -68,7 +76,7 @@ PreviewOptions picture_at(const SkinSettings& s, const geometry::Terrain& terrai
     box = Box3(Vec3(at.x() - r, at.y() - r, z - r / 4), Vec3(at.x() + r, at.y() + r, z + r / 4));
   }
   PreviewOptions picture = s.picture;
-  picture.camera = frame_camera(box, s.azimuth + share * s.turn, s.elevation, static_cast<Real>(picture.width) / picture.height, 0.02);
+  picture.camera = frame_camera(box, s.azimuth + film_time * s.turn, s.elevation, static_cast<Real>(picture.width) / picture.height, 0.02);
   return picture;
 }
 

@@ -25,13 +25,13 @@ struct SkinSettings {
   bool preview = true;
   PreviewOptions picture;
   Real azimuth = 0, elevation = 0;  ///< of the camera [rad]
-  Real turn = 0;                    ///< of the azimuth over the whole film [rad]
+  Real turn = 0;                    ///< of the azimuth [rad] a second of film
   std::vector<Real> view;           ///< map x, y [m] of the middle and the radius of what is looked at; empty: the terrain
 };
 
 SkinSettings read_skin_settings(flow::Parameters& root);
 
-/// The picture's options at a share 0..1 of the film.
-PreviewOptions picture_at(const SkinSettings& settings, const geometry::Terrain& terrain, Real share);
+/// The picture's options at a moment of the film [s].
+PreviewOptions picture_at(const SkinSettings& settings, const geometry::Terrain& terrain, Real film_time);
 
 }  // namespace effuse::skin

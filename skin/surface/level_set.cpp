@@ -39,7 +39,7 @@ LevelSet build_level_set(const geometry::Points& points, Real volume, const geom
   const float radius = static_cast<float>(options.radius) * d;
   s.reach = static_cast<float>(options.influence) * d;
   s.outside = s.reach - radius;
-  s.lift = 0.75f * d;  // the lowest particles float half a spacing over the ground, on rough ground up to one and more
+  s.lift = d / 2;  // the lowest particles float so high over the ground
   s.report.particles = points.size();
   s.particles = ParticleGrid(points, s.voxel, std::max(1.0, s.reach / 2.0));
   if (points.size() == 0) return surface;
@@ -61,7 +61,7 @@ LevelSet build_level_set(const geometry::Points& points, Real volume, const geom
   if (terrain) {
     s.terrain = *terrain;
     const float depth = sink + 2;  // voxels deeper than this are outside, whatever they were
-    ground = sample_ground(s, *terrain, std::max(s.lift, depth) + 1);
+    ground = sample_ground(s, *terrain, std::max(2 * s.lift, depth) + 1);
     Field lifted;
     lift_to_ground(s, ground, depth, lifted);
     s.phi.swap(lifted);

@@ -60,8 +60,9 @@ class LevelSet {
 /// particle (no floating blobs, no webs; a sheet one particle thick stays whole up to 1.4 spacings between its
 /// particles); and smoothing acts only where a particle has neighbours, so that drops do not shrink away.
 ///
-/// Then cut at the ground: below three quarters of a spacing over it the field is that of the point lifted along the ground's
-/// normal to that height, so that lava stands straight on the ground; and it ends `sink` under the ground, so that no gap
+/// Then cut at the ground: at a height g over it, in spacings, the field is the least of those at max(g, 1/2), max(g, 3/4) and
+/// max(g, 1) along the ground's normal, so that lava stands straight on the ground, also on ground so rough that its lowest
+/// particles float a spacing over it; and it ends `sink` under the ground, so that no gap
 /// shows and nothing flickers. Without terrain nothing is cut. Ground distance is sampled every second voxel.
 ///
 /// All particles are needed, the inner ones too: where there are none it is hollow. Deterministic: the same bits on any

@@ -14,7 +14,7 @@ struct LevelSet::Impl {
   Real spacing = 1;           ///< [m]
   float reach = 4;            ///< of a particle
   float outside = 2.8f;       ///< value where there are no blocks; nothing is larger
-  float lift = 1;             ///< below this height over the ground a point counts as lifted to it
+  float lift = 1;             ///< height of the lowest particles over the ground: what is under it is filled
   ParticleGrid particles;
   Blocks blocks;
   Field phi;                  ///< the surface is its zero level; about a distance near it
@@ -36,8 +36,8 @@ inline constexpr float kNoGround = 1e9f;
 /// than `reach` are kNoGround above it and -kNoGround below.
 GroundField sample_ground(const LevelSet::Impl& s, const geometry::Terrain& terrain, float reach);
 
-/// phi out: s.phi with every voxel lower than s.lift over the ground given the value of the point at that height along the
-/// normal; voxels deeper than `depth` are left as they are.
+/// phi out: s.phi, but each voxel at height g < 2 lift has the least value along the ground's normal at max(g, lift),
+/// max(g, 1.5 lift), max(g, 2 lift); continuous. Voxels deeper than `depth` are left as they are.
 void lift_to_ground(const LevelSet::Impl& s, const GroundField& ground, float depth, Field& phi);
 
 /// Mean-curvature flow phi_t = kappa |grad phi| for a time [voxels^2], in explicit steps; where W (rasterize.h) is like a

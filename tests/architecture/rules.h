@@ -78,7 +78,8 @@ inline const std::vector<Room>& rooms() {
   return all;
 }
 
-/// Folders of a room that only that folder itself (and who is above the room) may include: they look up.
+/// Folders that stand above the rest of their room, because they speak to scenes: included by one another and by who is
+/// above the room, not by the rest.
 inline const std::vector<std::string>& rooms_joining_scenes() {
   static const std::vector<std::string> all{"skin/scene", "importers/scene", "importers/info"};
   return all;
@@ -158,9 +159,9 @@ Faults include_faults(const std::string& path, const std::string& text, Exists&&
       if (!ends_with(name, ".h")) fault("only headers are included");
       const bool below = std::any_of(room.may_include.begin(), room.may_include.end(), [&](const std::string& f) { return inside(name, f); });
       if (!below) fault("an arrow that climbs: " + room.folder + " may not see it");
-      for (const std::string& joining : rooms_joining_scenes())
-        if (below && inside(name, joining) && !inside(path, joining) && room.folder != "samples")
-          fault("only " + joining + " speaks to scenes; it stands above the rest of its room");
+      const auto& joining = rooms_joining_scenes();
+      const auto joins = [&](const std::string& p) { return std::any_of(joining.begin(), joining.end(), [&](const std::string& f) { return inside(p, f); }); };
+      if (below && joins(name) && !joins(path) && room.folder != "samples") fault("it speaks to scenes, and stands above the rest of its room");
       if (is_internal(name) && is_public_header(path)) fault("a public header may not show what is internal");
       if (is_internal(name) && room_of(name).folder != room.folder && name.substr(0, name.find('/')) != path.substr(0, path.find('/')))
         fault("internal to " + name.substr(0, name.find('/')));

@@ -183,12 +183,16 @@ TEST(LevelSet, RandomClustersGiveSolidMeshes) {
 TEST(LevelSet, LavaOnASlopeStandsOnTheGround) {
   const Terrain ground = slope(100, 0.35, 0.6);
   const Real d = 0.5;
-  // A mound on the slope: particles half a spacing and more above the ground.
-  const Cloud cloud = fill(Box3(Vec3(-8, -8, 95), Vec3(8, 8, 107)), d, [&](const Vec3& p) {
-    const Real height = 3 * (1 - (p.x() * p.x() + p.y() * p.y()) / 49);
-    const Real g = ground.signed_distance(p);
-    return g > 0.45 * d && g < height;
-  });
+  // A mound on the slope in layers along it, the lowest half a spacing over the ground, as a flow lies.
+  Cloud cloud;
+  std::uint64_t number = 0;
+  const Real cosine = 1 / std::sqrt(1 + 0.35 * 0.35);
+  for (Real x = -8; x < 8; x += d * cosine)
+    for (Real y = -8; y < 8; y += d)
+      for (int layer = 0; layer < 3 * (1 - (x * x + y * y) / 49) / d - 0.5; ++layer, ++number) {
+        const auto off = [&](std::uint64_t axis) { return 0.1 * d * (2 * random_uniform(9, axis, number) - 1); };
+        cloud.add(Vec3(x + off(0), y + off(1), ground.height(x, y).value() + (layer + 0.5) * d / cosine + off(2)), d);
+      }
   ASSERT_GT(cloud.x.size(), 1000u);
   const LevelSet surface = build_level_set(cloud.points(), cloud.volume(), &ground, at_spacing(d));
   const TriMesh mesh = mesh_level_set(surface);
