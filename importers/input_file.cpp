@@ -37,6 +37,31 @@ std::string printable(std::string_view text, std::size_t limit) {
   return out;
 }
 
+std::string utf8(std::string_view text) {
+  const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u; };
+  std::string latin1;
+  bool valid = true;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const unsigned c = byte(i);
+    if (c < 0x80) {
+      latin1 += static_cast<char>(c);
+    } else {
+      latin1 += static_cast<char>(0xc0 | (c >> 6));
+      latin1 += static_cast<char>(0x80 | (c & 0x3f));
+    }
+  }
+  for (std::size_t i = 0; i < text.size() && valid;) {
+    const unsigned c = byte(i), next = byte(i + 1);
+    const std::size_t length = c < 0x80 ? 1 : c >= 0xc2 && c < 0xe0 ? 2 : c >= 0xe0 && c < 0xf0 ? 3 : c >= 0xf0 && c < 0xf5 ? 4 : 0;
+    valid = length > 0;
+    for (std::size_t k = 1; k < length; ++k) valid = valid && (byte(i + k) & 0xc0) == 0x80;
+    // Longer than need be, halves of UTF-16 pairs, beyond the last code point.
+    if ((c == 0xe0 && next < 0xa0) || (c == 0xed && next >= 0xa0) || (c == 0xf0 && next < 0x90) || (c == 0xf4 && next >= 0x90)) valid = false;
+    i += std::max<std::size_t>(length, 1);
+  }
+  return valid ? std::string(text) : latin1;
+}
+
 std::string quote(std::string_view text) { return fmt::format("'{}'", printable(text, 40)); }
 
 std::string lower(std::string_view text) {

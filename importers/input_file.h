@@ -18,6 +18,9 @@ std::string quote(std::string_view text);
 /// The same without quotes and up to 200 characters: messages of packages, which may quote binary files.
 std::string printable(std::string_view text, std::size_t limit = 200);
 
+/// The text if it is UTF-8, else read as Latin-1 and turned into UTF-8: old files name places with accents.
+std::string utf8(std::string_view text);
+
 /// ASCII lower case.
 std::string lower(std::string_view text);
 

@@ -42,8 +42,14 @@ class Lava final : public Effect {
   Real spacing() const override { return lava_.options().spacing; }
   std::size_t memory() const override { return lava_.memory(); }
   void add_to(StateHash& hash) const override { lava_.add_to(hash); }
-  void save(StateWriter& out) const override { lava_.save(out); }
-  void load(StateReader& in) override { lava_.load(in); }
+  void save(StateWriter& out) const override {
+    lava_.save(out);
+    archive(*this, out);
+  }
+  void load(StateReader& in) override {
+    lava_.load(in);
+    archive(*this, in);
+  }
 
   std::vector<std::pair<std::string, double>> figures() const override {
     return {{"particles", static_cast<double>(lava_.size())},
@@ -65,6 +71,18 @@ class Lava final : public Effect {
   }
 
  private:
+  /// What the figures say of the steps so far: a run resumed reports the whole.
+  template <class Self, class Archive>
+  static void archive(Self& self, Archive& io) {
+    io.value("steps", self.steps_);
+    io.value("retries", self.retries_);
+    io.value("smallest_step", self.smallest_step_);
+    io.value("max_speed", self.last_.max_speed);
+    io.value("max_compression", self.last_.max_compression);
+    io.value("min_temperature", self.last_.min_temperature);
+    io.value("max_temperature", self.last_.max_temperature);
+  }
+
   ClassicLava lava_;
   sph::StepReport last_;
   std::size_t steps_ = 0, retries_ = 0;
@@ -90,6 +108,7 @@ PlannedVent read_vent(Parameters& p) {
     planned.place = p.place("from");
     planned.from = point("from", true, "one end of a fissure, in the terrain file's coordinates");
     planned.to = point("to", true, "its other end");
+    point("at", false, "not with a fissure");
     if (p.has("at")) p.fault("at", "found with 'from' and 'to', wanted one or the other: a crater vent is 'at' a point, a fissure runs 'from' one 'to' another");
   } else {
     planned.from = planned.to = point("at", true, "centre of a round vent, in the terrain file's coordinates");
@@ -104,17 +123,13 @@ PlannedVent read_vent(Parameters& p) {
   return planned;
 }
 
+// Beyond these a number in the scene is a slip, and the run would never end.
+constexpr Real kMostParticles = 1e9, kMostSites = 1e6, kMostSteps = 1e9;
+
 Estimate estimate(const ClassicOptions& o, const std::vector<PlannedVent>& vents, Real duration) {
   Estimate e;
-  Real hottest_rate = 0;
-  for (const PlannedVent& v : vents) {
-    e.particles += v.vent.volume(duration) / std::pow(o.spacing, 3);
-    hottest_rate = std::max(hottest_rate, v.vent.rate);
-  }
-  const Real h = o.support * o.spacing / 2, m2 = o.support * o.support * o.spacing * o.spacing / 14;
-  const Real sound = std::sqrt(o.stiffness);
-  const Real dt = std::min({o.max_step, o.courant * h / (1.15 * sound), 0.35 * m2 / o.viscosity.max});
-  e.steps = duration / dt;
+  for (const PlannedVent& v : vents) e.particles += v.vent.volume(duration) / std::pow(o.spacing, 3);
+  e.steps = 1.15 * duration / o.rest_step();  // lava that moves takes shorter ones
   e.bytes = 720 * e.particles;
   // 0.5 us a particle, step and evaluation on two cores (the benchmark's figure); on average half the particles are there.
   e.seconds = e.steps * e.particles / 2 * 0.5e-6 * evaluations(o.scheme) + e.steps * 5e-5;
@@ -126,6 +141,7 @@ Estimate estimate(const ClassicOptions& o, const std::vector<PlannedVent>& vents
 EffectPlan read_lava(Parameters& p, Real duration) {
   ClassicOptions o;
   const auto positive = Parameters::positive(), not_negative = Parameters::not_negative();
+  const Parameters::Range temperature = {0, 5000, true};
   p.choice("model", {"classic"}, 0, "the equations: classic is Stora et al. 1999");
   o.spacing = p.number("spacing", "m", std::nullopt, positive, "between particles at rest: the resolution");
   o.support = p.number("support", "", o.support, {1.5, 4}, "radius of the kernel, in spacings");
@@ -138,9 +154,9 @@ EffectPlan read_lava(Parameters& p, Real duration) {
   Parameters viscosity = p.table("viscosity", "kinematic, nu(T) = b exp(-a T) through two points");
   auto& law = o.viscosity;
   law.hot_nu = viscosity.number("hot", "m2/s", law.hot_nu, positive, "at hot_temperature");
-  law.hot_temperature = viscosity.number("hot_temperature", "K", law.hot_temperature, positive, "");
+  law.hot_temperature = viscosity.number("hot_temperature", "K", law.hot_temperature, temperature, "");
   law.cold_nu = viscosity.number("cold", "m2/s", law.cold_nu, positive, "at cold_temperature");
-  law.cold_temperature = viscosity.number("cold_temperature", "K", law.cold_temperature, positive, "");
+  law.cold_temperature = viscosity.number("cold_temperature", "K", law.cold_temperature, temperature, "");
   law.max = viscosity.number("max", "m2/s", law.max, positive, "never above: the explicit step pays for it");
   if (law.cold_temperature >= law.hot_temperature) viscosity.fault("cold_temperature", "is not below hot_temperature");
   if (law.cold_nu < law.hot_nu) viscosity.fault("cold", "is below hot: lava thickens as it cools");
@@ -148,7 +164,7 @@ EffectPlan read_lava(Parameters& p, Real duration) {
   o.diffusivity = p.number("diffusivity", "m2/s", o.diffusivity, not_negative, "of heat inside");
   o.heat_capacity = p.number("heat_capacity", "J/(kg K)", o.heat_capacity, positive, "");
   o.air_exchange = p.number("air_exchange", "W/(m2 K)", o.air_exchange, not_negative, "heat transfer to the air");
-  o.air_temperature = p.number("air_temperature", "K", o.air_temperature, positive, "");
+  o.air_temperature = p.number("air_temperature", "K", o.air_temperature, temperature, "");
   o.ground_exchange = p.number("ground_exchange", "W/(m2 K)", o.ground_exchange, not_negative, "heat transfer to the ground");
   o.scheme = static_cast<Scheme>(p.choice("scheme", names(kSchemeNames), 1, "time integration"));
   o.courant = p.number("courant", "", o.courant, {0, 2, true}, "of the step: share of the time sound takes over half the support");
@@ -156,6 +172,7 @@ EffectPlan read_lava(Parameters& p, Real duration) {
   o.surface.mass_quotient = p.number("surface_mass_quotient", "", o.surface.mass_quotient, {0, 1}, "on the surface below this share of mass in the outer half-space");
   o.surface.coplanarity = p.number("surface_coplanarity", "", o.surface.coplanarity, {0, 1}, "on the surface when the neighbours are this flat");
   o.rest_period = p.number("rest_period", "s", o.rest_period, not_negative, "material coordinates are renewed this often; 0: never");
+  if (o.rest_period > 0 && o.rest_period < 1e-3) p.fault("rest_period", "must be 0 s, or at least 0.001 s");
 
   std::vector<PlannedVent> vents;
   for (Parameters& vent : p.tables("vent", "where lava comes out; at least one")) vents.push_back(read_vent(vent));
@@ -164,6 +181,19 @@ EffectPlan read_lava(Parameters& p, Real duration) {
   EffectPlan plan;
   plan.name = "lava";
   plan.estimate = estimate(o, vents, duration);
+  Real widest = 0;  // of the vents, in sites
+  for (const PlannedVent& v : vents) widest = std::max(widest, (std::max((v.to - v.from).norm(), v.vent.width) / o.spacing + 1) * (v.vent.width / o.spacing + 1));
+  // Negated: what is not a number is too many as well.
+  if (o.spacing <= 0) {
+    // Told already: without a spacing there is nothing to count.
+  } else if (!(plan.estimate.particles <= kMostParticles)) {
+    p.fault("spacing", fmt::format("the vents' rates would make {:.3g} particles of this size, at most {:.0e}: a larger spacing or a smaller rate would do", plan.estimate.particles, kMostParticles));
+  } else if (!(widest <= kMostSites)) {
+    p.fault("spacing", fmt::format("the widest vent would have {:.3g} particles side by side, at most {:.0e}: a larger spacing or a narrower vent would do", widest, kMostSites));
+  } else if (!(plan.estimate.steps <= kMostSteps)) {
+    p.fault("", fmt::format("the film covers {:.3g} s, {:.3g} steps, at most {:.0e}: look at film.time_scale, film.fps, max_step, courant, stiffness, viscosity and heat exchange", duration,
+                            plan.estimate.steps, kMostSteps));
+  }
   plan.build = [o, vents](const World& world) -> std::unique_ptr<Effect> {
     ClassicOptions options = o;
     options.seed = world.seed;
@@ -178,12 +208,17 @@ EffectPlan read_lava(Parameters& p, Real duration) {
         const std::optional<Real> z = terrain.height(local.x(), local.y());
         const Box3 box = terrain.bounds();
         if (!z)
-          faults.push_back({planned.place, fmt::format("the vent at {:.1f}, {:.1f} is not on the terrain, which runs from {:.1f}, {:.1f} to {:.1f}, {:.1f}", map.x(), map.y(),
+          faults.push_back({planned.place, fmt::format("the vent at {:.12g}, {:.12g} is not on the terrain, which runs from {:.12g}, {:.12g} to {:.12g}, {:.12g}", map.x(), map.y(),
                                                        box.min().x() + origin.x(), box.min().y() + origin.y(), box.max().x() + origin.x(), box.max().y() + origin.y())});
         return Vec3(local.x(), local.y(), z.value_or(0));
       };
       vent.from = ground(planned.from);
       vent.to = planned.to == planned.from ? vent.from : ground(planned.to);
+      std::size_t beside = 0;
+      const std::vector<Vec3> sites = vent.lattice(o.spacing);
+      for (const Vec3& site : sites) beside += !terrain.height(site.x(), site.y());
+      if (beside > 0 && faults.empty())
+        faults.push_back({planned.place, fmt::format("{} of the vent's {} sites are not on the terrain: it reaches over the edge or a hole, wanted a narrower vent or one further in", beside, sites.size())});
       placed.push_back(vent);
     }
     if (!faults.empty()) throw InputError(faults);

@@ -18,8 +18,9 @@ Scene read_scene(Parameters& root, std::span<const EffectKind> kinds) {
   Parameters terrain = root.table("terrain", "the ground");
   scene.terrain_file = terrain.text("file", std::nullopt, "DEM grid or mesh, relative to the scene file");
   scene.terrain_place = terrain.place("file");
+  if (terrain.has("file") && (scene.terrain_file.empty() || scene.terrain_file.find('\0') != std::string::npos)) terrain.fault("file", "is not the name of a file");
   scene.terrain_crs = terrain.text("crs", "", "coordinate system, when the file says none or a wrong one");
-  scene.ground_temperature = terrain.number("temperature", "K", 288.15, Parameters::positive(), "of the ground");
+  scene.ground_temperature = terrain.number("temperature", "K", 288.15, {0, 5000, true}, "of the ground");
 
   for (const EffectKind& kind : kinds) {
     if (!root.has(kind.name)) continue;

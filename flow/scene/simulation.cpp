@@ -7,6 +7,7 @@
 #include "geometry/base/check.h"
 #include "geometry/base/error.h"
 #include "geometry/base/files.h"
+#include "geometry/base/hash.h"
 #include "geometry/base/zones.h"
 
 namespace effuse::flow {
@@ -14,20 +15,34 @@ namespace effuse::flow {
 namespace fs = std::filesystem;
 
 namespace {
-constexpr std::string_view kMagic = "effuse checkpoint 1";
+constexpr std::string_view kMagic = "effuse checkpoint 2";
+constexpr std::size_t kHashDigits = 16;  // at the end of a checkpoint, of all before it
 constexpr std::size_t kKeep = 2;  // one to fall back on should the newest be damaged
+
+std::string hash_of(std::string_view bytes) {
+  StateHash hash;
+  hash.add(bytes);
+  return hash.hex();
+}
+}  // namespace
 
 std::vector<fs::path> checkpoints(const fs::path& folder) {
   std::vector<fs::path> found;
   std::error_code ignored;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder / "checkpoints", ignored)) {
     const std::string name = entry.path().filename().string();
-    if (name.starts_with("checkpoint.") && name.ends_with(".state") && name.find(".part") == std::string::npos) found.push_back(entry.path());
+    constexpr std::string_view kHead = "checkpoint.", kTail = ".state";
+    const bool numbered = name.starts_with(kHead) && name.ends_with(kTail) && name.size() > kHead.size() + kTail.size() &&
+                          name.find_first_not_of("0123456789", kHead.size()) == name.size() - kTail.size();
+    if (numbered && entry.is_regular_file(ignored)) found.push_back(entry.path());
   }
-  std::sort(found.begin(), found.end());
+  std::sort(found.rbegin(), found.rend());
   return found;
 }
-}  // namespace
+
+bool undamaged(std::string_view checkpoint) {
+  return checkpoint.size() > kHashDigits && checkpoint.substr(checkpoint.size() - kHashDigits) == hash_of(checkpoint.substr(0, checkpoint.size() - kHashDigits));
+}
 
 Simulation::Simulation(const Scene& scene, const World& world) : scene_(&scene) {
   for (const EffectPlan& plan : scene.effects) effects_.push_back(plan.build(world));
@@ -72,7 +87,7 @@ std::string Simulation::checkpoint(const std::string& scene_key) const {
     effect->save(out);
   }
   out.text("end", "end");
-  return out.bytes();
+  return out.bytes() + hash_of(out.bytes());
 }
 
 void Simulation::restore(std::string_view bytes, const std::string& scene_key, const std::string& file) {
@@ -80,6 +95,7 @@ void Simulation::restore(std::string_view bytes, const std::string& scene_key, c
   std::string text;
   in.text("magic", text);
   if (text != kMagic) throw InputError(Place{file}, fmt::format("found '{:.40}', wanted '{}'", text, kMagic));
+  if (!undamaged(bytes)) throw InputError(Place{file}, "the checkpoint is damaged: its bytes are not those that were written");
   in.text("scene", text);
   if (text != scene_key) throw InputError(Place{file}, "the scene has changed since this checkpoint was written; start anew in another folder, or put the scene back");
   int frame = 0;
@@ -99,16 +115,11 @@ void Simulation::restore(std::string_view bytes, const std::string& scene_key, c
 void write_checkpoint(const fs::path& folder, const Simulation& simulation, const std::string& scene_key) {
   ZONE("checkpoint");
   write_file(folder / "checkpoints" / fmt::format("checkpoint.{:04}.state", simulation.frame()), simulation.checkpoint(scene_key));
-  std::vector<fs::path> all = checkpoints(folder);
-  for (std::size_t i = 0; i + kKeep < all.size(); ++i) {
+  const std::vector<fs::path> all = checkpoints(folder);
+  for (std::size_t i = kKeep; i < all.size(); ++i) {
     std::error_code ignored;
     fs::remove(all[i], ignored);
   }
-}
-
-fs::path newest_checkpoint(const fs::path& folder) {
-  const std::vector<fs::path> all = checkpoints(folder);
-  return all.empty() ? fs::path() : all.back();
 }
 
 }  // namespace effuse::flow

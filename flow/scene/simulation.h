@@ -31,7 +31,7 @@ class Simulation {
 
   /// Bytes of a checkpoint. scene_key: of the settings the state belongs to.
   std::string checkpoint(const std::string& scene_key) const;
-  /// Throws InputError when the bytes are cut short, of another version, another scene_key or other effects.
+  /// Throws InputError when the bytes are damaged, of another version, another scene_key or other effects.
   void restore(std::string_view bytes, const std::string& scene_key, const std::string& file);
 
  private:
@@ -42,7 +42,9 @@ class Simulation {
 
 /// DIR/checkpoints/checkpoint.0042.state, whole or absent; keeps the newest two.
 void write_checkpoint(const std::filesystem::path& folder, const Simulation& simulation, const std::string& scene_key);
-/// Path of the newest checkpoint, empty when there is none.
-std::filesystem::path newest_checkpoint(const std::filesystem::path& folder);
+/// The checkpoints there are, newest first.
+std::vector<std::filesystem::path> checkpoints(const std::filesystem::path& folder);
+/// Whether the bytes are a checkpoint as it was written, to the last bit.
+bool undamaged(std::string_view checkpoint);
 
 }  // namespace effuse::flow

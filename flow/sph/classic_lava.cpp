@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "geometry/base/check.h"
 #include "geometry/base/error.h"
@@ -15,9 +16,11 @@ namespace effuse::flow::sph {
 
 namespace {
 constexpr Index kNone = ~Index{0};
-constexpr int kSortInterval = 16;    // steps between two orderings of the particles in memory
+constexpr int kSortInterval = 16;    // steps between two orderings of the particles in memory, and looks for what left
 constexpr int kMaxRetries = 8;
-constexpr Real kTorn = 0.9;          // of the rest density
+constexpr Real kSmallestStep = 1e-6; // of the step at rest
+constexpr Real kTorn = 0.9;          // of the rest density: no density falls below
+constexpr Real kScatter = 0.15;      // of the rest density: summed over 26 disordered neighbours instead of a lattice's
 constexpr Real kClearance = 0.25;    // a particle stays this many spacings off the ground
 constexpr std::string_view kModel = "classic 1";  // of a checkpoint: changes with what is saved
 constexpr std::uint64_t kPhaseStream = 1;  // random numbers: when a vent's sites start
@@ -32,6 +35,22 @@ auto with_kernel(KernelKind kind, Real support, F&& f) {
   }
 }
 
+/// Thrown by a stage of a scheme that is not fit to ask for rates: the step is given up.
+struct BadStage {};
+
+/// An archive (ClassicLava::archive) that hashes.
+struct HashArchive {
+  StateHash& hash;
+  template <class T>
+  void array(std::string_view, const std::vector<T>& values) {
+    hash.add(std::span<const T>(values));
+  }
+  template <class T>
+  void value(std::string_view, T v) {
+    hash.add(v);
+  }
+};
+
 /// values[k] = values[which[k]]
 template <class T>
 void gather(std::vector<T>& values, const std::vector<Index>& which) {
@@ -43,8 +62,21 @@ void gather(std::vector<T>& values, const std::vector<Index>& which) {
 
 Real ExponentialViscosity::a() const { return std::log(cold_nu / hot_nu) / (hot_temperature - cold_temperature); }
 Real ExponentialViscosity::b() const { return hot_nu * std::exp(a() * hot_temperature); }
-// Written about the hot point: exp(a T) alone overflows for steep laws.
-Real ExponentialViscosity::at(Real temperature) const { return std::min(max, hot_nu * std::exp(a() * (hot_temperature - temperature))); }
+// Written about the hot point: exp(a T) alone overflows for steep laws. Never 0: two such have no harmonic mean.
+Real ExponentialViscosity::at(Real temperature) const {
+  return std::max(std::numeric_limits<Real>::min(), std::min(max, hot_nu * std::exp(a() * (hot_temperature - temperature))));
+}
+
+Real ClassicOptions::heat_step() const {
+  const Real m2 = with_kernel(kernel, support * spacing, [](const auto& W) { return W.second_moment(); });
+  const Real loss = (air_exchange + ground_exchange) / (density * heat_capacity * spacing);  // [1/s], of a particle at rest density
+  return std::min(0.35 * m2 / diffusivity, 0.5 / loss);
+}
+
+Real ClassicOptions::rest_step() const {
+  const Real m2 = with_kernel(kernel, support * spacing, [](const auto& W) { return W.second_moment(); });
+  return std::min({max_step, courant * support * spacing / 2 / std::sqrt(stiffness), 0.35 * m2 / viscosity.max, heat_step()});
+}
 
 void add_scaled_velocities(LavaState& y, Real a, const LavaState& k) {
   parallel_for(y.size(), [&](std::size_t i) {
@@ -85,6 +117,7 @@ ClassicLava::ClassicLava(const ClassicOptions& options, std::vector<Vent> vents,
   CHECK_GT(options.courant, 0.0);
   CHECK_GT(options.max_step, 0.0);
   CHECK_GE(options.surface_interval, 1);
+  for (const Vent& vent : vents_) CHECK(std::isfinite(vent.rate) && vent.rate >= 0);
   place_sites();
   rest2_born_ = -options_.rest_period / 2;
 }
@@ -95,6 +128,8 @@ void ClassicLava::place_sites() {
     for (Vec3 at : lattice) {
       // Down (or up) onto the ground by Newton's method on the signed distance along the vertical.
       Vec3 up = Vec3::UnitZ();
+      const Real start = at.z();
+      Real off = 0;
       for (int iteration = 0; iteration < 20; ++iteration) {
         geometry::Contact nearest;
         for (const ContactSource& source : ground_) {
@@ -104,8 +139,14 @@ void ClassicLava::place_sites() {
         }
         if (!nearest.any()) break;
         up = nearest.normal;
+        off = std::abs(nearest.distance);
         at.z() -= nearest.distance / std::max(up.z(), 0.2);
         if (std::abs(nearest.distance) < 1e-6 * options_.spacing) break;
+      }
+      // Over a rim or beside a wall of a mesh it runs away: then the height of the vent has to do.
+      if (!(off <= options_.spacing)) {
+        at.z() = start;
+        up = Vec3::UnitZ();
       }
       const Real phase = random_uniform(options_.seed, kPhaseStream, sites_.size());
       sites_.push_back({at, up, static_cast<Index>(v), static_cast<Real>(lattice.size()) * std::pow(options_.spacing, 3), phase});
@@ -224,6 +265,7 @@ void ClassicLava::find_contacts() {
 }
 
 void ClassicLava::compute_rates(const LavaState& y, LavaState& k, bool velocities, bool positions) {
+  if (&y != &y_ && !acceptable(y)) throw BadStage();
   if (neighbors_of_ != y.x.data()) find_neighbors(y.x);
   // A kick leaves the positions, and so the lists, as they are; anything else moves them.
   if (positions) neighbors_of_ = nullptr;
@@ -286,7 +328,7 @@ void ClassicLava::accumulate(const Kernel& kernel, const LavaState& y, LavaState
     dT *= kappa * m;
     summed *= m;
 
-    bool grounded = false;
+    Vec3 ground_normal = Vec3::Zero();  // of ground that it lies on
     const Real r2_over_rho = kVelocities && surface_[i] ? std::pow(m / a.rho, 2.0 / 3.0) / a.rho : 0;  // 0: exchanges nothing
     if (contact_index_[i] != kNone && site_[i] == kFree) {  // under a vent there is no floor
       for (std::size_t s = 0; s < ground_.size(); ++s) {
@@ -302,7 +344,7 @@ void ClassicLava::accumulate(const Kernel& kernel, const LavaState& y, LavaState
         drho -= 2 * rho0 * area * dv.dot(normal);
         summed += rho0 * density_half_space_.gamma(d);
         if (d < options_.spacing) {
-          grounded = true;
+          ground_normal = normal;
           const Real T_ground = c.surface_temperature > 0 ? c.surface_temperature : options_.ground_temperature;
           dT -= options_.ground_exchange * exchange * r2_over_rho * (a.T - T_ground);
         }
@@ -310,12 +352,14 @@ void ClassicLava::accumulate(const Kernel& kernel, const LavaState& y, LavaState
     }
     if (surface_[i]) {
       // To the air goes what does not lie on the ground; a sheet one particle thick has both sides.
-      const bool covered = grounded && outward_[i].dot(contacts_[contact_index_[i]].normal) < -0.3;
+      const bool covered = outward_[i].dot(ground_normal) < -0.3;
       if (!covered) dT -= options_.air_exchange * exchange * r2_over_rho * (a.T - options_.air_temperature);
     }
-    // Towards the summed density; at a free surface, where the sum lacks what is not there, towards
-    // rest density: no pressure. Lava tears rather than thins: no density falls below kTorn.
-    drho += relax * (std::max(summed, rho0) - a.rho);
+    // Drift is pulled back to what the sum allows: to within the scatter that disorder gives it, and on
+    // the surface, where it lacks what is not there, not above rest density, no pressure.
+    const Real low = summed - kScatter * rho0, high = surface_[i] ? std::max(summed, rho0) : summed + kScatter * rho0;
+    drho += relax * (std::max(low - a.rho, 0.0) - std::max(a.rho - high, 0.0));
+    // Lava tears rather than thins.
     if (a.rho < kTorn * rho0) drho = std::max(drho, 0.0);
 
     const bool held = site_[i] != kFree;
@@ -342,23 +386,32 @@ Real ClassicLava::stable_step() const {
   const Real speed = std::sqrt(parallel_max(size(), 0, [&](std::size_t i) { return y_.v[i].squaredNorm(); }));
   const Real coldest = -parallel_max(size(), -1e6, [&](std::size_t i) { return -y_.T[i]; });
   const Real m2 = with_kernel(options_.kernel, support_, [](const auto& kernel) { return kernel.second_moment(); });
-  Real dt = std::min(options_.max_step, options_.courant * support_ / 2 / (std::sqrt(options_.stiffness) + speed));
+  Real dt = std::min({options_.max_step, options_.heat_step(), options_.courant * support_ / 2 / (std::sqrt(options_.stiffness) + speed)});
   if (size() > 0) dt = std::min(dt, 0.35 * m2 / options_.viscosity.at(coldest));
   if (max_acceleration_ > 0) dt = std::min(dt, 0.4 * std::sqrt(options_.spacing / max_acceleration_));
   return dt;
 }
 
-bool ClassicLava::acceptable() const {
+bool ClassicLava::try_step(Real dt) {
+  try {
+    integrate_step(options_.scheme, System{*this}, time_, dt, y_, storage_);
+  } catch (const BadStage&) {
+    return false;
+  }
+  return acceptable(y_);
+}
+
+bool ClassicLava::acceptable(const LavaState& y) const {
   const Real limit = options_.spacing / 2;
   const Real worst = parallel_max(size(), 0, [&](std::size_t i) {
-    const bool good = y_.v[i].allFinite() && std::isfinite(y_.T[i]) && y_.rho[i] > 0.1 * options_.density && y_.rho[i] < 10 * options_.density &&
-                      (y_.x[i] - before_.x[i]).squaredNorm() < limit * limit;
+    const bool good = y.v[i].allFinite() && std::isfinite(y.T[i]) && y.rho[i] > 0.1 * options_.density && y.rho[i] < 10 * options_.density &&
+                      (y.x[i] - before_.x[i]).squaredNorm() < limit * limit;
     return good ? 0.0 : 1.0;
   });
   return worst == 0;
 }
 
-std::size_t ClassicLava::leave_ground_behind() {
+void ClassicLava::push_out_of_ground() {
   ZONE("sph.contacts");
   const Real clearance = kClearance * options_.spacing;
   std::vector<Index> suspects;
@@ -370,7 +423,6 @@ std::size_t ClassicLava::leave_ground_behind() {
 
   std::vector<Vec3> at(suspects.size());
   std::vector<geometry::Contact> contact(suspects.size());
-  std::vector<std::uint8_t> touches(suspects.size(), 0);
   for (std::size_t q = 0; q < suspects.size(); ++q) ground_bound_[suspects[q]] = support_;
   for (const ContactSource& source : ground_) {
     for (std::size_t q = 0; q < suspects.size(); ++q) at[q] = y_.x[suspects[q]];
@@ -379,7 +431,6 @@ std::size_t ClassicLava::leave_ground_behind() {
       const geometry::Contact& c = contact[q];
       if (!c.any()) continue;
       const Index i = suspects[q];
-      touches[q] = 1;
       ground_bound_[i] = std::min(ground_bound_[i], c.distance);
       if (c.distance >= clearance) continue;
       y_.x[i] += (clearance - c.distance) * c.normal;
@@ -388,25 +439,18 @@ std::size_t ClassicLava::leave_ground_behind() {
       ground_bound_[i] = clearance;
     }
   }
-  if (!inside_) return 0;
+}
 
-  // No ground within reach: in the air above it, or over its edge.
+std::size_t ClassicLava::drop_what_left() {
+  if (!inside_) return 0;
+  // Who lies on the ground has not left it, nor who is in the midst of others.
+  std::vector<std::uint8_t> left(size());
+  parallel_for(size(), [&](std::size_t i) { left[i] = surface_[i] && ground_bound_[i] > options_.spacing && !inside_(y_.x[i]); }, 4096);
   std::vector<Index> stay;
-  std::size_t next = 0, gone = 0;
-  std::vector<std::uint8_t> lost(size(), 0);
-  for (std::size_t q = 0; q < suspects.size(); ++q) {
-    const Index i = suspects[q];
-    if (!touches[q] && !inside_(y_.x[i])) {
-      lost[i] = 1;
-      ++gone;
-    } else if (!touches[q]) {
-      ground_bound_[i] = 0;  // look again at the next step
-    }
-  }
-  if (gone == 0) return 0;
-  for (; next < size(); ++next)
-    if (!lost[next]) stay.push_back(static_cast<Index>(next));
-  keep(stay);
+  for (std::size_t i = 0; i < size(); ++i)
+    if (!left[i]) stay.push_back(static_cast<Index>(i));
+  const std::size_t gone = size() - stay.size();
+  if (gone > 0) keep(stay);
   left_ += gone;
   return gone;
 }
@@ -428,10 +472,15 @@ StepReport ClassicLava::step(Real dt_max) {
   ZONE("sph.step");
   CHECK_GT(dt_max, 0.0);
   StepReport report;
-  Real dt = std::min(dt_max, stable_step());
-
   neighbors_of_ = nullptr;
-  if (steps_ % kSortInterval == 0) sort_particles();
+  if (steps_ % kSortInterval == 0) {
+    report.left = drop_what_left();
+    sort_particles();
+  }
+  Real dt = std::min(dt_max, stable_step());
+  if (dt < dt_max && dt < kSmallestStep * options_.rest_step())
+    throw UnstableError(fmt::format("at t = {:.6g} s speed or acceleration leave a step of {:.3g} s only ({} particles)", time_, dt, size()));
+
   if (steps_ % static_cast<std::uint64_t>(options_.surface_interval) == 0 && size() > 0) {
     find_neighbors(y_.x);
     find_surface(y_.x, neighbors_, support_, options_.surface, surface_, outward_);
@@ -440,8 +489,7 @@ StepReport ClassicLava::step(Real dt_max) {
   carry(dt);
   before_ = y_;
   for (;; ++report.retries, dt /= 2) {
-    integrate_step(options_.scheme, System{*this}, time_, dt, y_, storage_);
-    if (acceptable()) break;
+    if (try_step(dt)) break;
     y_ = before_;
     neighbors_of_ = nullptr;
     if (report.retries == kMaxRetries)
@@ -451,7 +499,7 @@ StepReport ClassicLava::step(Real dt_max) {
   max_acceleration_ = std::sqrt(parallel_max(size(), 0, [&](std::size_t i) { return ((y_.v[i] - before_.v[i]) / dt).squaredNorm(); }));
   time_ += dt;
   ++steps_;
-  report.left = leave_ground_behind();
+  push_out_of_ground();
   report.emitted = emit(time_ - dt, time_);
   renew_rest();
 
@@ -492,23 +540,11 @@ geometry::Points ClassicLava::points() const {
 }
 
 std::size_t ClassicLava::memory() const {
-  const std::size_t n = y_.x.capacity();
-  return n * (6 * sizeof(Vec3) + 2 * sizeof(Real) + 2 * sizeof(Real) + sizeof(std::uint64_t) + 1 + sizeof(Real)) + packed_.capacity() * sizeof(Packed) +
-         contacts_.capacity() * sizeof(geometry::Contact) + grid_.memory() + neighbors_.memory() + 2 * n * (2 * sizeof(Vec3) + 2 * sizeof(Real));
-}
-
-void ClassicLava::add_to(StateHash& hash) const {
-  hash.add(std::span<const Vec3>(y_.x));
-  hash.add(std::span<const Vec3>(y_.v));
-  hash.add(std::span<const Real>(y_.rho));
-  hash.add(std::span<const Real>(y_.T));
-  hash.add(std::span<const std::uint64_t>(id_));
-  hash.add(std::span<const Real>(birth_));
-  hash.add(std::span<const Vec3>(rest_));
-  hash.add(std::span<const Vec3>(rest2_));
-  hash.add(std::span<const std::uint8_t>(surface_));
-  hash.add(time_);
-  hash.add(steps_);
+  const auto bytes = [](const auto&... vectors) { return ((vectors.capacity() * sizeof(vectors[0])) + ...); };
+  const auto of_state = [&](const LavaState& y) { return bytes(y.x, y.v, y.rho, y.T); };
+  return of_state(y_) + bytes(id_, birth_, site_, number_, rest_, rest2_, surface_, outward_, ground_bound_) + of_state(before_) + of_state(storage_.stage) +
+         of_state(storage_.k1) + of_state(storage_.k2) + of_state(storage_.k3) + of_state(storage_.k4) + bytes(packed_, contacts_, contact_of_, contact_index_, query_) +
+         bytes(radius_, crust_, age_, sites_) + grid_.memory() + neighbors_.memory();
 }
 
 template <class Self, class Archive>
@@ -534,6 +570,11 @@ void ClassicLava::archive(Self& self, Archive& io) {
   io.value("left", self.left_);
   io.value("steps", self.steps_);
   io.value("max_acceleration", self.max_acceleration_);
+}
+
+void ClassicLava::add_to(StateHash& hash) const {
+  HashArchive io{hash};
+  archive(*this, io);
 }
 
 void ClassicLava::save(StateWriter& out) const {

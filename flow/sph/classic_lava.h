@@ -56,6 +56,13 @@ struct ClassicOptions {
   int surface_interval = 4;   ///< steps between two looks at who is on the surface
   Real rest_period = 60;      ///< [s] between two births of one set of material coordinates; 0: never
   std::uint64_t seed = 1;
+
+  /// The largest step for lava at rest [s]: the conditions of ClassicLava::stable_step() without speed and
+  /// acceleration, at the viscosity's maximum.
+  Real rest_step() const;
+  /// The largest step for the explicit exchange of heat [s]: 0.35 m2 / kappa inside, and half the time in which
+  /// a particle with one face to the air and one to the ground would lose its heat.
+  Real heat_step() const;
 };
 
 /// Fills out[i] with the nearest surface to x[i] of one solid (any() false: none within reach).
@@ -99,7 +106,7 @@ struct StepReport {
 /// Ground: surface particles get contacts, and the inner ones that the ground's half-space reaches (the
 /// paper has the surface ones only; a force that comes and goes with the flag pumps energy into the flow).
 /// The half-space beyond the contact's plane joins the sums like a mirror image: the particle's own
-/// pressure and density, twice its approach speed (so that the work of the pressure is what the density
+/// pressure (ground does not pull) and density, twice its approach speed (so that the work of the pressure is what the density
 /// takes up: with the speed alone the ground pumps energy into the flow). Drag of the ground as of a
 /// neighbour at rest. A hard projection at the end of the step keeps every particle at least
 /// spacing / 4 outside. Both ask only about particles that may have come near since their distance was
@@ -108,8 +115,9 @@ struct StepReport {
 /// Density by continuity grows noise over thousands of steps: a diffusion of density
 ///   2 delta (support/2) sqrt(k) sum_j (m/rho_j) (rho_j - rho_i) (x_j - x_i) . grad W_ij / r^2
 /// smooths it (Molteni & Colagrossi 2009, Comput. Phys. Commun. 180, 861-872). And it drifts: slowly it is
-/// pulled towards  max(rho0, summed over neighbours and ground); the sum reads low at a free surface, where
-/// rest density, no pressure, is what should be. Below 0.9 rho0 lava tears: the density falls no further.
+/// pulled back to what the density summed over neighbours and ground allows, +- 0.15 rho0 for the disorder of
+/// the neighbours; on the surface, where the sum lacks what is not there, to no more than rest density.
+/// Below 0.9 rho0 lava tears: the density falls no further.
 ///
 /// Symplectic Euler kicks velocities with the old density, then moves positions and density with the
 /// new velocities: two passes over the neighbours, stable for sound as Euler is not.
@@ -118,20 +126,22 @@ struct StepReport {
 class ClassicLava {
  public:
   /// Checks the options (spacing, support, density, stiffness, capacities > 0).
-  /// inside: whether a point has ground above or below it; particles that leave are taken out and
-  /// counted. Empty: none leave.
+  /// inside: whether a point has ground above or below it; surface particles that come off the ground where
+  /// there is none are taken out and counted, a few steps later. Empty: none leave.
   ClassicLava(const ClassicOptions& options, std::vector<Vent> vents, std::vector<ContactSource> ground, std::function<bool(const Vec3&)> inside = {});
 
   /// Adds particles at rest density; ids follow on. All finite (checked).
   void add(std::span<const Vec3> x, std::span<const Vec3> v, std::span<const Real> temperature);
 
-  /// One step of at most dt_max [s] > 0. A step whose result is not finite, or moves a particle by more
-  /// than half a spacing, is undone and tried with half the size, eight times at most; then
-  /// UnstableError, the state as before the step.
+  /// One step of at most dt_max [s] > 0. A step whose result (or a stage of it) is not finite, or moves a
+  /// particle by more than half a spacing, is undone and tried with half the size, eight times at most; then
+  /// UnstableError, the particles where they were before the step. UnstableError, too, when speed or
+  /// acceleration leave less than a millionth of rest_step(): time would stand still.
   StepReport step(Real dt_max);
 
   /// The largest step the conditions below allow now [s]:
-  ///   courant (support/2) / (sqrt(k) + max|v|),   0.35 m2 / max nu,   0.4 sqrt(dx / max|a|), max_step
+  ///   courant (support/2) / (sqrt(k) + max|v|),   0.35 m2 / max nu,   0.4 sqrt(dx / max|a|),
+  ///   heat_step(),   max_step
   Real stable_step() const;
 
   Real time() const { return time_; }
@@ -176,11 +186,13 @@ class ClassicLava {
   void compute_rates(const LavaState& y, LavaState& k, bool velocities, bool positions);
   template <bool kVelocities, bool kPositions, class Kernel>
   void accumulate(const Kernel& kernel, const LavaState& y, LavaState& k);
-  std::size_t leave_ground_behind();  // hard projection; drops what left, returns how many
-  bool acceptable() const;
+  void push_out_of_ground();        // the hard projection
+  std::size_t drop_what_left();     // returns how many
+  bool try_step(Real dt);           // false: the state is not fit to go on from
+  bool acceptable(const LavaState& y) const;
   void renew_rest();
   template <class Self, class Archive>
-  static void archive(Self& self, Archive& io);  // save and load: one list, one order
+  static void archive(Self& self, Archive& io);  // save, load and hash: one list, one order
 
   ClassicOptions options_;
   std::vector<Vent> vents_;

@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/base/check.h"
+
 namespace effuse::flow::sph {
 
 std::vector<Vec3> Vent::lattice(Real spacing) const {
   const Vec2 line = (to - from).head<2>();
   const Real length = line.norm();
+  CHECK_LE(std::max(length, width) / spacing, 1e6);
   std::vector<Vec3> sites;
   const auto half_count = [&](Real extent) { return static_cast<int>(std::floor(extent / 2 / spacing)); };
   if (length < 1e-9) {
@@ -15,7 +18,7 @@ std::vector<Vec3> Vent::lattice(Real spacing) const {
     const int n = half_count(width);
     for (int j = -n; j <= n; ++j)
       for (int i = -n; i <= n; ++i)
-        if (4 * spacing * spacing * (i * i + j * j) <= width * width) sites.push_back(from + spacing * Vec3(i, j, 0));
+        if (4 * spacing * spacing * (static_cast<Real>(i) * i + static_cast<Real>(j) * j) <= width * width) sites.push_back(from + spacing * Vec3(i, j, 0));
     return sites;
   }
   // A strip: whole rows along the line, columns across it, both centred.

@@ -26,7 +26,8 @@ struct Vent {
   Real stop = std::numeric_limits<Real>::infinity();  ///< [s]
   Real ramp = 0;             ///< [s], the rate grows from 0 and falls to 0 linearly over this time
 
-  /// Sites of the lattice over the area, at the height of the centre line. At least one.
+  /// Sites of the lattice over the area, at the height of the centre line. At least one; no longer or wider than
+  /// a million spacings (checked).
   std::vector<Vec3> lattice(Real spacing) const;
   /// Volume let out by time t [m^3]: the integral of the rate.
   Real volume(Real t) const;

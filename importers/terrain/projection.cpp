@@ -64,7 +64,7 @@ std::string projection_title(const std::string& crs) {
 }
 
 std::string check_projection(const std::string& wkt, const std::string& name, std::vector<std::string>& notes) {
-  const std::string text(trimmed(wkt));
+  const std::string text = utf8(trimmed(wkt));
   const std::size_t projected = find_keyword(text, {"projcs", "projcrs", "projectedcrs"});
   if (projected == std::string::npos) {
     if (find_keyword(text, {"geogcs", "geogcrs", "geographiccrs", "geodcrs", "geodeticcrs"}) != std::string::npos)

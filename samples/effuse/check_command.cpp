@@ -55,7 +55,7 @@ ExitCode check(const CheckCommand& command, const CommonOptions& common) {
     j["memory_bytes"] = sum.bytes;
     j["disk_bytes"] = disk;
     j["terrain"] = loaded->notes;
-    fmt::print("{}\n", j.dump(1));
+    print_document(j.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
     return ExitCode::kDone;
   }
   fmt::print("{}: sound\n", command.scene.string());
@@ -95,7 +95,7 @@ ExitCode effects(const CommonOptions& common) {
     }
     j.push_back({{"name", kind.name}, {"what", kind.what}, {"parameters", entries}});
   }
-  if (common.json) fmt::print("{}\n", j.dump(1));
+  if (common.json) print_document(j.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   return ExitCode::kDone;
 }
 

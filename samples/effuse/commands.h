@@ -10,6 +10,9 @@
 /// errors are thrown and turned into codes by main().
 namespace effuse {
 
+/// The one JSON document of --json, on stdout. Write bytes that are not UTF-8 (file names may hold them) as U+FFFD.
+void print_document(const std::string& json);
+
 struct CommonOptions {
   bool json = false, quiet = false;
   int threads = 0;  ///< 0: all

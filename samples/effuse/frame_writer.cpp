@@ -6,7 +6,6 @@
 
 #include "geometry/base/files.h"
 #include "geometry/base/zones.h"
-#include "geometry/mesh/measure.h"
 #include "skin/color/lava_color.h"
 #include "skin/detail/displace.h"
 #include "skin/preview/preview.h"
@@ -128,7 +127,7 @@ void FrameWriter::write_manifest(int frames_done) const {
   ordered_json times = ordered_json::array();
   for (int frame = 1; frame <= frames_done; ++frame) times.push_back(scene_.frame_time(frame));
   m["frame_times"] = times;
-  write_file(folder_ / "manifest.json", m.dump(1) + "\n");
+  write_file(folder_ / "manifest.json", m.dump(1, ' ', false, ordered_json::error_handler_t::replace) + "\n");
 }
 
 }  // namespace effuse

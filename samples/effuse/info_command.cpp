@@ -31,7 +31,8 @@ std::vector<std::string> describe_run(const fs::path& folder) {
 }
 
 std::vector<std::string> describe(const fs::path& file) {
-  if (fs::is_directory(file)) return describe_run(file);
+  std::error_code ignored;  // a link to itself, a name too long: the reader says so
+  if (fs::is_directory(file, ignored)) return describe_run(file);
   if (file.extension() == ".vdb") return skin::describe_vdb(file);
   return importers::describe_file(file);
 }
@@ -52,7 +53,7 @@ ExitCode info(const std::vector<fs::path>& files, const CommonOptions& common) {
     }
   }
   if (!faults.empty()) throw InputError(faults);
-  if (common.json) fmt::print("{}\n", j.dump(1));
+  if (common.json) print_document(j.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   return ExitCode::kDone;
 }
 

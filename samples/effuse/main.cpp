@@ -1,10 +1,19 @@
 #include <fmt/format.h>
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
 #include <cstdio>
+#include <cstring>
 #include <new>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <string_view>
+#include <system_error>
 
 #include "geometry/base/log.h"
 #include "geometry/base/parallel.h"
@@ -22,17 +31,48 @@ int report(ExitCode code, const std::vector<effuse::Fault>& faults, bool json) {
     j["exit_code"] = static_cast<int>(code);
     for (const effuse::Fault& fault : faults)
       j["errors"].push_back({{"file", fault.place.file}, {"line", fault.place.line}, {"column", fault.place.column}, {"message", fault.message}});
-    fmt::print("{}\n", j.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+    effuse::print_document(j.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   }
-  for (const effuse::Fault& fault : faults) fmt::print(stderr, "error: {}\n", to_string(fault));
+  for (const effuse::Fault& fault : faults) {
+    const std::string line = "error: " + to_string(fault) + "\n";
+    std::fwrite(line.data(), 1, line.size(), stderr);  // who closed stderr does not want to know
+  }
   return static_cast<int>(code);
 }
 
 int report(ExitCode code, const std::string& message, bool json) { return report(code, std::vector<effuse::Fault>{{effuse::Place{}, message}}, json); }
 
+/// A closed standard stream is opened on nothing: else the first file written would get its number, and the log in it.
+void open_standard_streams() {
+  for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+    if (::fcntl(fd, F_GETFD) == -1 && ::open("/dev/null", fd == STDIN_FILENO ? O_RDONLY : O_WRONLY) < 0) ::_exit(static_cast<int>(ExitCode::kFailed));
+}
+
+/// What was printed is out, or the exit code says that it is not.
+int flushed(ExitCode code) {
+  if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return static_cast<int>(code);
+  const int error = errno;
+  const int lost = report(error == ENOSPC || error == EDQUOT || error == EFBIG ? ExitCode::kOutOfResources : ExitCode::kFailed,
+                          fmt::format("cannot write to standard output: {}", std::strerror(error)), false);
+  return code == ExitCode::kDone ? lost : static_cast<int>(code);
+}
+
+bool out_of_resources(const std::system_error& error) {
+  for (const int code : {ENOSPC, EDQUOT, EFBIG, ENOMEM, EAGAIN})
+    if (error.code() == std::error_code(code, std::generic_category()) || error.code() == std::error_code(code, std::system_category())) return true;
+  return false;
+}
+
 }  // namespace
 
+void effuse::print_document(const std::string& json) {
+  const std::string text = json + "\n";
+  std::fwrite(text.data(), 1, text.size(), stdout);  // main() looks whether it went out
+}
+
 int main(int argc, char** argv) {
+  open_standard_streams();
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that grows too large is an error to report, with nothing half written
   CLI::App app{"effuse: lava over real terrain"};
   app.set_version_flag("--version", std::string("effuse ") + EFFUSE_VERSION);
   app.require_subcommand(1);
@@ -67,29 +107,32 @@ int main(int argc, char** argv) {
 
   CLI::App* effects_verb = add_common(app.add_subcommand("effects", "the effects there are, and their parameters"));
 
+  // What goes wrong before the arguments are parsed keeps the promise of --json, too.
+  const bool asks_json = std::find(argv + 1, argv + argc, std::string_view("--json")) != argv + argc;
+
   // A typing error in the verb: name the nearest one instead of CLI11's list.
   if (argc > 1 && argv[1][0] != '-') {
     const std::vector<std::string> verbs = {"run", "check", "info", "effects"};
     if (std::find(verbs.begin(), verbs.end(), argv[1]) == verbs.end()) {
       const std::string nearest = effuse::nearest_name(argv[1], verbs);
-      return report(ExitCode::kBadInput, fmt::format("no verb '{}'; {}", argv[1], nearest.empty() ? "there are run, check, info, effects" : "did you mean '" + nearest + "'?"), false);
+      return report(ExitCode::kBadInput, fmt::format("no verb '{}'; {}", argv[1], nearest.empty() ? "there are run, check, info, effects" : "did you mean '" + nearest + "'?"), asks_json);
     }
   }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
-    return report(ExitCode::kBadInput, fmt::format("{} (see --help)", error.what()), common.json);
+    return report(ExitCode::kBadInput, fmt::format("{} (see --help)", error.what()), asks_json);
   }
 
   if (common.quiet || common.json) effuse::set_log_level(effuse::LogLevel::kWarnings);
   std::optional<effuse::ThreadLimit> limit;
   if (common.threads > 0) limit.emplace(common.threads);
   try {
-    if (*run_verb) return static_cast<int>(effuse::run(run, common));
-    if (*check_verb) return static_cast<int>(effuse::check(check, common));
-    if (*info_verb) return static_cast<int>(effuse::info(files, common));
-    if (*effects_verb) return static_cast<int>(effuse::effects(common));
+    if (*run_verb) return flushed(effuse::run(run, common));
+    if (*check_verb) return flushed(effuse::check(check, common));
+    if (*info_verb) return flushed(effuse::info(files, common));
+    if (*effects_verb) return flushed(effuse::effects(common));
   } catch (const effuse::InputError& error) {
     return report(ExitCode::kBadInput, error.faults(), common.json);
   } catch (const effuse::UnstableError& error) {
@@ -98,6 +141,8 @@ int main(int argc, char** argv) {
     return report(ExitCode::kOutOfResources, error.what(), common.json);
   } catch (const std::bad_alloc&) {
     return report(ExitCode::kOutOfResources, "out of memory", common.json);
+  } catch (const std::system_error& error) {
+    return report(out_of_resources(error) ? ExitCode::kOutOfResources : ExitCode::kFailed, error.what(), common.json);
   } catch (const std::exception& error) {
     return report(ExitCode::kFailed, error.what(), common.json);
   }

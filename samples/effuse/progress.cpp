@@ -16,6 +16,9 @@ bool can_overwrite() {
   return ::isatty(STDERR_FILENO) == 1 && term && std::string_view(term) != "dumb";
 }
 
+/// A terminal that is gone or a full disk under the log must not end the run.
+void say(const std::string& text) { std::fwrite(text.data(), 1, text.size(), stderr); }
+
 std::string duration(double s) {
   if (s < 90) return fmt::format("{:.0f} s", s);
   return s < 5400 ? fmt::format("{:.0f} min", s / 60) : fmt::format("{:.1f} h", s / 3600);
@@ -40,7 +43,7 @@ void Progress::tick(const std::string& status) {
   if (now - shown_ < std::chrono::milliseconds(100)) return;
   shown_ = now;
   open_ = true;
-  fmt::print(stderr, "\r\033[K{}", line(frame_, status));
+  say("\r\033[K" + line(frame_, status));
   std::fflush(stderr);
 }
 
@@ -48,12 +51,12 @@ void Progress::frame_done(int frame, const std::string& status) {
   frame_ = frame;
   if (quiet_) return;
   open_ = terminal_;
-  fmt::print(stderr, "{}{}{}", terminal_ ? "\r\033[K" : "", line(frame, status), terminal_ ? "" : "\n");
+  say((terminal_ ? "\r\033[K" : "") + line(frame, status) + (terminal_ ? "" : "\n"));
   std::fflush(stderr);
 }
 
 void Progress::end() {
-  if (open_) fmt::print(stderr, "\n");
+  if (open_) say("\n");
   open_ = false;
 }
 

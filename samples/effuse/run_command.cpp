@@ -1,9 +1,16 @@
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <csignal>
+#include <cstdio>
 #include <cstring>
+#include <new>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "geometry/base/files.h"
 #include "geometry/base/log.h"
@@ -29,6 +36,60 @@ void on_interrupt(int signal) {
   std::signal(signal, SIG_DFL);
 }
 
+/// Signals while a run writes: the ones that ask it to end checkpoint first, and a log that nobody reads any more
+/// (| head, a terminal that closed) does not end it.
+class Signals {
+ public:
+  Signals() {
+    g_interrupted = 0;
+    for (std::size_t k = 0; k < std::size(kStops); ++k) {
+      old_[k] = std::signal(kStops[k], on_interrupt);
+      if (kStops[k] == SIGHUP && old_[k] == SIG_IGN) std::signal(SIGHUP, SIG_IGN);  // nohup
+    }
+    old_pipe_ = std::signal(SIGPIPE, SIG_IGN);
+  }
+  ~Signals() {
+    for (std::size_t k = 0; k < std::size(kStops); ++k) std::signal(kStops[k], old_[k]);
+    std::signal(SIGPIPE, old_pipe_);
+  }
+
+ private:
+  static constexpr int kStops[] = {SIGINT, SIGTERM, SIGHUP};
+  void (*old_[std::size(kStops)])(int);
+  void (*old_pipe_)(int);
+};
+
+/// The folder to write, made and held against a second run: two would mix their frames.
+class OutputFolder {
+ public:
+  explicit OutputFolder(const fs::path& folder) {
+    const Place place{folder.string()};
+    std::error_code error;
+    if (fs::is_directory(folder, error)) {
+      if (::access(folder.c_str(), W_OK | X_OK) != 0) throw InputError(place, fmt::format("cannot be written to: {}", std::strerror(errno)));
+    } else {
+      if (fs::exists(fs::symlink_status(folder, error))) throw InputError(place, "is not a folder, wanted one to write the run to");
+      fs::create_directories(folder, error);
+      if (error == std::errc::no_space_on_device) throw ResourceError(fmt::format("{}: cannot make the folder: {}", folder.string(), error.message()));
+      if (error) throw InputError(place, "cannot make this folder: " + error.message());
+    }
+    fd_ = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    // Where locks are not to be had, it has to go without.
+    if (fd_ >= 0 && ::flock(fd_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
+      ::close(fd_);
+      throw InputError(place, "another effuse is writing to this folder; wait for it, or name another with -o");
+    }
+  }
+  ~OutputFolder() {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  OutputFolder(const OutputFolder&) = delete;
+  OutputFolder& operator=(const OutputFolder&) = delete;
+
+ private:
+  int fd_ = -1;
+};
+
 /// What run.json says: figures of the frames made, by this call and the ones it resumed.
 class RunRecord {
  public:
@@ -38,12 +99,13 @@ class RunRecord {
   void read(int last) {
     try {
       const ordered_json old = ordered_json::parse(read_file(folder_ / "run.json"));
-      if (old.at("scene_key") != loaded_.key) return;
+      if (old.at("scene_key") != loaded_.key) throw std::runtime_error("of another scene");
       for (const ordered_json& frame : old.at("frames"))
         if (frame.at("frame").get<int>() <= last) frames_.push_back(frame);
       earlier_s_ = old.at("seconds").get<double>();
     } catch (const std::exception&) {
-      log_warning(fmt::format("{} is missing or damaged: the hashes of the frames up to {} are not in the new one", (folder_ / "run.json").string(), last));
+      frames_ = ordered_json::array();
+      log_warning(fmt::format("{} is missing, damaged or of another scene: the hashes of the frames up to {} are not in the new one", (folder_ / "run.json").string(), last));
     }
   }
 
@@ -81,7 +143,7 @@ class RunRecord {
     return j;
   }
 
-  void write(const ordered_json& document) const { write_file(folder_ / "run.json", document.dump(1) + "\n"); }
+  void write(const ordered_json& document) const { write_file(folder_ / "run.json", document.dump(1, ' ', false, ordered_json::error_handler_t::replace) + "\n"); }
 
  private:
   const LoadedScene& loaded_;
@@ -93,8 +155,36 @@ class RunRecord {
 /// A name for the output folder when none is given: out/ and the scene's.
 fs::path default_folder(const fs::path& scene) { return fs::path("out") / scene.stem(); }
 
-void go_on_from(const fs::path& checkpoint, LoadedScene& loaded) {
-  loaded.simulation->restore(read_file(checkpoint), loaded.key, checkpoint.string());
+/// A word as a shell reads it back.
+std::string quoted(const std::string& word) {
+  if (!word.empty() && word.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=./,:@%") == std::string::npos) return word;
+  std::string out = "'";
+  for (const char c : word) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return out + "'";
+}
+
+/// The command that goes on with this run.
+std::string resume_line(const RunCommand& command, const fs::path& folder) {
+  std::string line = fmt::format("effuse run {} -o {}", quoted(command.scene.string()), quoted(folder.string()));
+  if (command.frames > 0) line += fmt::format(" --frames {}", command.frames);
+  for (const std::string& assignment : command.set) line += " --set " + quoted(assignment);
+  return line + " --resume";
+}
+
+/// Restores the newest checkpoint that is whole; false when there is none at all.
+bool go_on(const fs::path& folder, LoadedScene& loaded) {
+  const std::vector<fs::path> checkpoints = flow::checkpoints(folder);
+  for (const fs::path& checkpoint : checkpoints) {
+    const std::string bytes = read_file(checkpoint);
+    if (!flow::undamaged(bytes)) {
+      log_warning(fmt::format("{} is damaged or of another version, going back to the one before", checkpoint.string()));
+      continue;
+    }
+    loaded.simulation->restore(bytes, loaded.key, checkpoint.string());
+    return true;
+  }
+  if (!checkpoints.empty()) throw InputError(Place{(folder / "checkpoints").string()}, "every checkpoint is damaged or of another version; --force starts anew");
+  return false;
 }
 
 }  // namespace
@@ -106,20 +196,24 @@ ExitCode run(const RunCommand& command, const CommonOptions& common) {
   const flow::Scene& scene = loaded->scene;
   flow::Simulation& simulation = *loaded->simulation;
   for (const std::string& note : loaded->notes) log_info("terrain: " + note);
+  double particles = 0;
+  for (const flow::EffectPlan& plan : scene.effects) particles += plan.estimate.particles;
+  if (particles < 1) log_warning("not one particle will come out within the film: look at rate, start and spacing");
 
   const fs::path folder = command.folder.empty() ? default_folder(command.scene) : command.folder;
-  const std::string resume_line = fmt::format("effuse run {} -o {} --resume", command.scene.string(), folder.string());
-  const bool was_there = fs::exists(folder / "scene.toml");
+  std::error_code no_folder;
+  const bool was_there = fs::exists(folder / "scene.toml", no_folder);
   if (was_there && !command.resume && !command.force)
     throw InputError(Place{folder.string()}, "holds a run already: --resume goes on with it, --force starts anew, -o names another folder");
 
+  const OutputFolder held(folder);
   RunRecord record(*loaded, folder);
   if (command.resume && was_there) {
-    const fs::path checkpoint = flow::newest_checkpoint(folder);
-    if (!checkpoint.empty()) {
-      go_on_from(checkpoint, *loaded);
+    if (go_on(folder, *loaded)) {
       record.read(simulation.frame());
       log_info(fmt::format("going on after frame {}", simulation.frame()));
+    } else {
+      log_info("no checkpoint yet: starting from the first frame");
     }
   } else if (was_there) {
     for (const char* old : {"frames", "preview", "checkpoints", "run.json", "manifest.json"}) fs::remove_all(folder / old);
@@ -129,9 +223,7 @@ ExitCode run(const RunCommand& command, const CommonOptions& common) {
   write_file(folder / "scene.toml", loaded->resolved);
   writer.write_terrain();
 
-  g_interrupted = 0;
-  const auto old_handler = std::signal(SIGINT, on_interrupt);
-  const auto old_terminate = std::signal(SIGTERM, on_interrupt);
+  std::optional<Signals> signals(std::in_place);
   Progress progress(simulation.frame(), scene.frames, common.quiet);
   const auto status = [&] {
     std::string text;
@@ -156,35 +248,47 @@ ExitCode run(const RunCommand& command, const CommonOptions& common) {
       record.add_frame(simulation, result);
       progress.frame_done(simulation.frame(), fmt::format("{}, {} triangles", status(), result.triangles));
       if (simulation.frame() % loaded->skin.checkpoint_every == 0 || simulation.frame() == scene.frames) {
-        flow::write_checkpoint(folder, simulation, loaded->key);
+        // The record first: killed in between, it holds more frames than the checkpoint, never fewer.
         record.write(record.document(simulation, profile, "running"));
+        flow::write_checkpoint(folder, simulation, loaded->key);
         writer.write_manifest(simulation.frame());
       }
     }
-    if (code == ExitCode::kInterrupted) flow::write_checkpoint(folder, simulation, loaded->key);
+    if (code == ExitCode::kInterrupted) {
+      record.write(record.document(simulation, profile, outcome));
+      flow::write_checkpoint(folder, simulation, loaded->key);
+    }
     if (code == ExitCode::kDone) writer.write_contact_sheet(scene.frames);
   } catch (const UnstableError& error) {
     progress.end();
     log_warning(error.what());
     outcome = std::string("unstable: ") + error.what();
     code = ExitCode::kUnstable;
+    record.write(record.document(simulation, profile, outcome));
+    flow::write_checkpoint(folder, simulation, loaded->key);  // the state before the step that failed
+  } catch (const std::exception& error) {
+    const bool full = dynamic_cast<const ResourceError*>(&error) || dynamic_cast<const std::bad_alloc*>(&error);
+    progress.end();
+    if (full) log_warning("out of room; with more, this goes on: " + resume_line(command, folder));
+    throw;
   }
   progress.end();
-  std::signal(SIGINT, old_handler);
-  std::signal(SIGTERM, old_terminate);
 
   writer.write_manifest(simulation.frame());
   const ordered_json document = record.document(simulation, profile, outcome);
   record.write(document);
-  if (common.json) fmt::print("{}\n", document.dump(1));
-  if (!common.quiet && !common.json) fmt::print(stderr, "\n{}\n", profile.table());
+  if (!common.quiet && !common.json) {
+    const std::string table = "\n" + profile.table() + "\n";
+    std::fwrite(table.data(), 1, table.size(), stderr);
+  }
 
-  if (code == ExitCode::kInterrupted) log_warning("interrupted; this goes on: " + resume_line);
+  if (code == ExitCode::kInterrupted) log_warning("interrupted; this goes on: " + resume_line(command, folder));
   if (code == ExitCode::kUnstable) {
-    const fs::path checkpoint = flow::newest_checkpoint(folder);
-    log_warning(fmt::format("stopped in frame {}; the last good state is {}", simulation.frame() + 1, checkpoint.empty() ? "the start" : checkpoint.string()));
+    log_warning(fmt::format("stopped in frame {}; the last good state is {}", simulation.frame() + 1, flow::checkpoints(folder).front().string()));
   }
   if (code == ExitCode::kDone) log_info(fmt::format("{} frames in {}", simulation.frame(), (folder / "frames").string()));
+  signals.reset();  // a reader of the document that went away ends this as it does any tool
+  if (common.json) print_document(document.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   return code;
 }
 

@@ -131,7 +131,8 @@ DisplaceReport displace(TriMesh& mesh, const geometry::Terrain* terrain, const D
   DisplaceReport report;
   // A dual mesh's mean edge is 1.1 to 1.2 of its voxel: refined only when clearly too coarse, so that frames agree.
   constexpr int kMostRefined = 3;
-  for (Real edge = mean_edge(mesh); edge > 1.7 * o.edge * o.spacing && report.refined < kMostRefined; edge /= 2, ++report.refined) mesh = refine(mesh);
+  for (Real edge = mean_edge(mesh); edge > 1.7 * o.edge * o.spacing && report.refined < kMostRefined; edge /= 2, ++report.refined)
+    mesh = refine(mesh);
   if (mesh.normals.empty()) geometry::compute_normals(mesh);
 
   const std::size_t n = mesh.positions.size();

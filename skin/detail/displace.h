@@ -24,9 +24,9 @@ struct DisplaceOptions {
 };
 
 struct DisplaceReport {
-  int refined = 0;              ///< times every triangle was cut in four
-  Real largest = 0;             ///< displacement [m]
-  std::size_t held_back = 0;    ///< vertices displaced less than asked for, because a triangle would have turned over
+  int refined = 0;            ///< times every triangle was cut in four
+  Real largest = 0;           ///< displacement [m]
+  std::size_t held_back = 0;  ///< vertices displaced less than asked for, because a triangle would have turned over
 };
 
 /// Moves the vertices along their normals by noise that belongs to the material, and adds the attribute "detail", -1 in cracks

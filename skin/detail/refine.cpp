@@ -60,7 +60,8 @@ geometry::TriMesh refine(const geometry::TriMesh& mesh) {
   geometry::TriMesh fine;
   fine.positions = mesh.positions;
   fine.positions.resize(n + middles.size());
-  parallel_for(middles.size(), [&](std::size_t i) { fine.positions[n + i] = (mesh.positions[middles[i][0]] + mesh.positions[middles[i][1]]) / 2; });
+  parallel_for(middles.size(),
+               [&](std::size_t i) { fine.positions[n + i] = (mesh.positions[middles[i][0]] + mesh.positions[middles[i][1]]) / 2; });
   if (!mesh.normals.empty()) {
     fine.normals = mesh.normals;
     fine.normals.resize(n + middles.size());

@@ -1,5 +1,7 @@
 #include "skin/scene/skin_settings.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -18,18 +20,18 @@ SkinSettings read_skin_settings(flow::Parameters& root) {
   level_set.drop_volume = skin.number("drop_volume", "", level_set.drop_volume, Parameters::not_negative(), "pieces of fewer particles are left out");
   level_set.match_volume = skin.flag("match_volume", level_set.match_volume, "enclose the particles' volume");
   DisplaceOptions& detail = s.detail;
-  detail.amplitude = skin.number("amplitude", "", detail.amplitude, Parameters::not_negative(), "of the bumps where cold, in spacings; 0: none");
-  detail.wavelength = skin.number("wavelength", "", detail.wavelength, Parameters::positive(), "of the coarsest bumps, in spacings");
+  detail.amplitude = skin.number("amplitude", "", detail.amplitude, {0, 10}, "of the bumps where cold, in spacings; 0: none");
+  detail.wavelength = skin.number("wavelength", "", detail.wavelength, {0.01, 1e6}, "of the coarsest bumps, in spacings");
   detail.octaves = static_cast<int>(skin.integer("octaves", detail.octaves, 1, 12, "of the bumps, each half as wide"));
   detail.gain = skin.number("gain", "", detail.gain, {0, 1}, "height from octave to octave");
   detail.roughness = skin.number("roughness", "", detail.roughness, {0, 1}, "0 swells, 1 clinker");
   detail.edge = skin.number("edge", "", detail.edge, {0.05, 10}, "length of the mesh's edges, in spacings");
-  s.color.strength = skin.number("glow", "", s.color.strength, Parameters::not_negative(), "light of lava at 1200 degC, white paper in the sun is 1");
+  s.color.strength = skin.number("glow", "", s.color.strength, {0, 1e6}, "light of lava at 1200 degC, white paper in the sun is 1");
 
   s.color.exponent = skin.number("glow_exponent", "", s.color.exponent, {0, 30}, "glow goes with this power of the temperature: 4 flat, 17 physical");
-  s.color.molten = skin.number("molten", "K", s.color.molten, Parameters::positive(), "hotter than this the lava has no crust of plates");
-  s.color.plated = skin.number("plated", "K", s.color.plated, Parameters::positive(), "cooler than this it is all plates, with cracks between");
-  s.color.plate = skin.number("plate", "K", s.color.plate, Parameters::positive(), "apparent temperature of a closed plate over hot lava");
+  s.color.molten = skin.number("molten", "K", s.color.molten, {0, 5000, true}, "hotter than this the lava has no crust of plates");
+  s.color.plated = skin.number("plated", "K", s.color.plated, {0, 5000, true}, "cooler than this it is all plates, with cracks between");
+  s.color.plate = skin.number("plate", "K", s.color.plate, {0, 5000, true}, "apparent temperature of a closed plate over hot lava");
   s.color.crack_width = skin.number("crack_width", "", s.color.crack_width, {0, 1}, "share of the plated surface that is cracks, roughly");
   if (s.color.plated >= s.color.molten) skin.fault("plated", "is not below molten");
   detail.molten = s.color.molten;
@@ -50,20 +52,24 @@ SkinSettings read_skin_settings(flow::Parameters& root) {
   picture.width = static_cast<int>(preview.integer("width", picture.width, 16, 8192, "pixels"));
   picture.height = static_cast<int>(preview.integer("height", picture.height, 16, 8192, "pixels"));
   picture.samples = static_cast<int>(preview.integer("samples", picture.samples, 1, 256, "rays a pixel"));
-  picture.exposure = preview.number("exposure", "", picture.exposure, Parameters::positive(), "");
-  picture.sun = preview.number("sun", "", picture.sun, Parameters::not_negative(), "strength");
-  picture.sky = preview.number("sky", "", picture.sky, Parameters::not_negative(), "strength");
+  picture.exposure = preview.number("exposure", "", picture.exposure, {0, 1e6, true}, "");
+  picture.sun = preview.number("sun", "", picture.sun, {0, 1e6}, "strength");
+  picture.sky = preview.number("sky", "", picture.sky, {0, 1e6}, "strength");
   const Vec3 sun = picture.sun_direction.normalized();
   const Real sun_azimuth = preview.number("sun_azimuth", "rad", std::atan2(sun.y(), sun.x()), {}, "where the sun stands, counter-clockwise from east");
   const Real sun_elevation = preview.number("sun_elevation", "rad", std::asin(sun.z()), {-1.5, 1.5}, "above the horizon: low is dusk, 0.6 is day");
   picture.sun_direction = Vec3(std::cos(sun_azimuth) * std::cos(sun_elevation), std::sin(sun_azimuth) * std::cos(sun_elevation), std::sin(sun_elevation));
-  picture.haze = preview.number("haze", "", picture.haze, Parameters::not_negative(), "");
-  picture.glow_light = preview.number("glow_light", "", picture.glow_light, Parameters::not_negative(), "how much lava lights the ground");
+  picture.haze = preview.number("haze", "", picture.haze, {0, 1e6}, "");
+  picture.glow_light = preview.number("glow_light", "", picture.glow_light, {0, 1e6}, "how much lava lights the ground");
   s.azimuth = preview.number("azimuth", "rad", -2.2, {}, "where the camera stands, counter-clockwise from east");
   s.elevation = preview.number("elevation", "rad", 0.5, {-0.2, 1.5}, "of the camera above the horizon");
   s.turn = preview.number("turn", "rad/s", 0, {}, "of the camera round its target, by seconds of film");
   s.view = preview.numbers("view", "m", 3, false, "x, y in the terrain file's coordinates and radius of what the camera frames; absent: all the terrain");
-  if (s.view.size() == 3 && s.view[2] <= 0) preview.fault("view", "the radius, third number, is not above 0");
+  if (s.view.size() == 3) {
+    // Beyond, rays in single precision lose themselves; no map reaches as far.
+    if (!(s.view[2] >= 1e-3 && s.view[2] <= 1e7)) preview.fault("view", fmt::format("the radius, third number, is {}, must be from 0.001 to 1e7 m", s.view[2]));
+    if (std::max(std::abs(s.view[0]), std::abs(s.view[1])) > 1e8) preview.fault("view", "lies more than 1e8 m from the origin of the map");
+  }
   return s;
 }
 

@@ -118,10 +118,12 @@ void lift_to_ground(const LevelSet::Impl& s, const GroundField& ground, float de
           const float g = ground.distance[at];
           phi[at] = old[at];
           if (g >= 2 * s.lift || g < -depth) continue;
-          const Vec3 p(kSide * c[0] + static_cast<int>(v >> 6), kSide * c[1] + static_cast<int>((v >> 3) & 7), kSide * c[2] + static_cast<int>(v & 7));
+          const Vec3 p(kSide * c[0] + static_cast<int>(v >> 6), kSide * c[1] + static_cast<int>((v >> 3) & 7),
+                       kSide * c[2] + static_cast<int>(v & 7));
           const Vec3 normal = ground.normal[at].cast<Real>();
           for (const float height : {s.lift, 1.5f * s.lift, 2 * s.lift}) {
-            const float value = height <= g ? old[at] : s.blocks.sample(old, s.outside, static_cast<Index>(b), p + static_cast<Real>(height - g) * normal);
+            const float value =
+                height <= g ? old[at] : s.blocks.sample(old, s.outside, static_cast<Index>(b), p + static_cast<Real>(height - g) * normal);
             phi[at] = height == s.lift ? value : std::min(phi[at], value);
           }
         }

@@ -72,7 +72,8 @@ LevelSet build_level_set(const geometry::Points& points, Real volume, const geom
     s.report.target = volume;
     const float shift = matching_shift(s.blocks, s.outside, s.phi, ground.above, voxels(volume), d / 2);
     s.report.shift = static_cast<Real>(shift) * s.voxel;
-    parallel_for(s.phi.size(), [&](std::size_t i) { s.phi[i] -= shift; }, 1 << 14);
+    parallel_for(
+        s.phi.size(), [&](std::size_t i) { s.phi[i] -= shift; }, 1 << 14);
     s.outside -= shift;
   }
   if (terrain)
@@ -82,7 +83,7 @@ LevelSet build_level_set(const geometry::Points& points, Real volume, const geom
           if (ground.distance[i] < kNoGround) s.phi[i] = std::min(s.outside, std::max(s.phi[i], -ground.distance[i] - sink));
         },
         1 << 14);
-  if (options.drop_volume > 0) drop_small_pieces(s.blocks, options.drop_volume * std::pow(static_cast<Real>(d), 3), s.phi, s.report);
+  drop_pieces(s.blocks, s.particles, options.drop_volume * std::pow(static_cast<Real>(d), 3), s.phi, s.report);
 
   s.report.volume = enclosed(s.blocks, s.outside, s.phi, ground.above, 0) * std::pow(s.voxel, 3);
   if (s.report.target > 0) s.report.residual = s.report.volume / s.report.target - 1;

@@ -13,24 +13,25 @@
 namespace effuse::skin {
 
 struct LevelSetOptions {
-  Real spacing = 0;       ///< particle spacing [m], > 0
-  Real voxel = 0;         ///< [m]; 0: spacing / 2
-  Real influence = 2;     ///< a particle is felt within influence * spacing
-  Real radius = 0.6;      ///< of the sphere round a lone particle, in spacings (about (3/4pi)^(1/3) = 0.62 for equal volume)
-  int smoothing = 2;      ///< passes of mean-curvature flow, each as far as one at voxel = spacing / 2 whatever the voxel
-  Real sink = 0;          ///< [m] how far under the ground the surface ends; 0: one and a half voxels
-  Real drop_volume = 0;   ///< closed pieces and closed bubbles smaller than this many particles' volume are dropped, filled
+  Real spacing = 0;          ///< particle spacing [m], > 0
+  Real voxel = 0;            ///< [m]; 0: spacing / 2
+  Real influence = 2;        ///< a particle is felt within influence * spacing
+  Real radius = 0.6;         ///< of the sphere round a lone particle, in spacings (about (3/4pi)^(1/3) = 0.62 for equal volume)
+  int smoothing = 2;         ///< passes of mean-curvature flow, each as far as one at voxel = spacing / 2 whatever the voxel
+  Real sink = 0;             ///< [m] how far under the ground the surface ends; 0: one and a half voxels
+  Real drop_volume = 0;      ///< closed pieces and closed bubbles smaller than this many particles' volume are dropped, filled
   bool match_volume = true;  ///< shift the surface so that it encloses the particles' volume above ground
 };
 
 /// What building a level set did.
 struct LevelSetReport {
   std::size_t particles = 0;
-  Real volume = 0;        ///< [m^3] enclosed, above ground
-  Real target = 0;        ///< [m^3] what it was to be; 0: nothing asked for
-  Real shift = 0;         ///< [m] by which the surface was moved out, within +-0.5 spacing
-  Real residual = 0;      ///< volume / target - 1; 0 without target. Not small: the bound of the shift stood in the way
-  std::size_t dropped_pieces = 0, filled_bubbles = 0;
+  Real volume = 0;               ///< [m^3] enclosed, above ground
+  Real target = 0;               ///< [m^3] what it was to be; 0: nothing asked for
+  Real shift = 0;                ///< [m] by which the surface was moved out, within +-0.5 spacing
+  Real residual = 0;             ///< volume / target - 1; 0 without target. Not small: the bound of the shift stood in the way
+  std::size_t dropped_webs = 0;  ///< pieces of the field that held no particle
+  std::size_t dropped_pieces = 0, filled_bubbles = 0;  ///< by drop_volume
 };
 
 /// The lava's surface as a narrow-band level set, with fields beside it. Opaque: OpenVDB stays inside.
@@ -55,10 +56,11 @@ class LevelSet {
 };
 
 /// Level set round the points (Zhu & Bridson 2005): phi(x) = |x - xbar| - rbar, xbar and rbar averages of the
-/// particles' positions and radii with weights (1 - (|x - x_i|/R)^2)^3, R = influence * spacing. Two repairs: between
-/// particles that do not touch the average lies in empty space, so phi >= 3 (d - spacing), d the distance of the nearest
-/// particle (no floating blobs, no webs; a sheet one particle thick stays whole up to 1.4 spacings between its
-/// particles); and smoothing acts only where a particle has neighbours, so that drops do not shrink away.
+/// particles' positions and radii with weights (1 - (|x - x_i|/R)^2)^3, R = influence * spacing. Three repairs: between
+/// particles that do not touch the average lies in empty space, so phi >= 3 (d - 1.15 spacing), d the distance of the
+/// nearest particle (no floating blobs, no webs; a sheet one particle thick stays whole up to 1.6 spacings between its
+/// particles); pieces that hold no particle are dropped; and smoothing acts only where a
+/// particle has neighbours, so that drops do not shrink away.
 ///
 /// Then cut at the ground: at a height g over it, in spacings, the field is the least of those at max(g, 1/2), max(g, 3/4) and
 /// max(g, 1) along the ground's normal, so that lava stands straight on the ground, also on ground so rough that its lowest
@@ -86,7 +88,8 @@ Real volume_above_ground(const LevelSet& surface, const geometry::Terrain* terra
 /// between), and when the points had them "temperature" and "velocity" inside and up to two voxels outside; metadata as
 /// strings of the file. Half floats, blosc. Whole or absent: the file's table of contents is walked before it gets its name, so that a
 /// full disk is noticed (OpenVDB does not) and thrown as ResourceError. Empty level set: the grids, empty.
-void write_vdb(const std::filesystem::path& file, const LevelSet& surface, const std::vector<std::pair<std::string, std::string>>& metadata);
+void write_vdb(const std::filesystem::path& file, const LevelSet& surface,
+               const std::vector<std::pair<std::string, std::string>>& metadata);
 
 /// Names, classes, active voxels and bounds of the grids of a VDB file, one line each, from
 /// the headers: fast whatever the size. A truncated file is noticed. Throws InputError.

@@ -10,14 +10,14 @@
 namespace effuse::skin {
 
 struct LevelSet::Impl {
-  Real voxel = 1;             ///< [m]
-  Real spacing = 1;           ///< [m]
-  float reach = 4;            ///< of a particle
-  float outside = 2.8f;       ///< value where there are no blocks; nothing is larger
-  float lift = 1;             ///< height of the lowest particles over the ground: what is under it is filled
+  Real voxel = 1;        ///< [m]
+  Real spacing = 1;      ///< [m]
+  float reach = 4;       ///< of a particle
+  float outside = 2.8f;  ///< value where there are no blocks; nothing is larger
+  float lift = 1;        ///< height of the lowest particles over the ground: what is under it is filled
   ParticleGrid particles;
   Blocks blocks;
-  Field phi;                  ///< the surface is its zero level; about a distance near it
+  Field phi;  ///< the surface is its zero level; about a distance near it
   std::optional<geometry::Terrain> terrain;
   LevelSetReport report;
 
@@ -50,11 +50,12 @@ Real enclosed(const Blocks& blocks, float outside, const Field& phi, const Field
 /// The shift within +-most at which enclosed() is the target to 1e-4 of it; the nearer end when there is none.
 float matching_shift(const Blocks& blocks, float outside, const Field& phi, const Field& above, Real target, float most);
 
-/// Turns face-connected sets of inner voxels smaller than `least` [voxels] into outer ones, and closed bubbles likewise.
-void drop_small_pieces(const Blocks& blocks, Real least, Field& phi, LevelSetReport& report);
+/// Turns inner voxels into outer ones where a face-connected set of them holds no particle (webs between particles) or is
+/// smaller than `least` [voxels], and closed bubbles smaller than that into inner ones.
+void drop_pieces(const Blocks& blocks, const ParticleGrid& particles, Real least, Field& phi, LevelSetReport& report);
 
-/// Distances to the zero level of phi, right to a twentieth of a voxel beside it and a fifth three voxels away, out to +-band and cut there; the zero level
-/// stays where it is to a twentieth. Voxels without a block are outside.
+/// Distances to the zero level of phi, right to a twentieth of a voxel beside it and a fifth three voxels away, out to +-band and cut
+/// there; the zero level stays where it is to a twentieth. Voxels without a block are outside.
 Field distances(const Blocks& blocks, float outside, const Field& phi, float band);
 
 /// The particles' carried numbers at points [voxels], taken at the lifted point near the ground.

@@ -45,7 +45,8 @@ struct EdgeTable {
       edges[filled[std::min(a, b)]++] = {std::max(a, b), h, a < b};
     }
     parallel_for(mesh.positions.size(), [&](std::size_t v) {
-      std::stable_sort(edges.begin() + begin[v], edges.begin() + begin[v + 1], [](const HalfEdge& x, const HalfEdge& y) { return x.high < y.high; });
+      std::stable_sort(edges.begin() + begin[v], edges.begin() + begin[v + 1],
+                       [](const HalfEdge& x, const HalfEdge& y) { return x.high < y.high; });
     });
   }
 
@@ -149,8 +150,7 @@ ManifoldReport make_manifold(TriMesh& mesh) {
   CHECK(mesh.attributes.empty());
   CHECK(mesh.normals.empty());
   ManifoldReport report;
-  report.dropped_triangles =
-      std::erase_if(mesh.triangles, [](const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; });
+  report.dropped_triangles = std::erase_if(mesh.triangles, [](const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; });
 
   // Each round parts what can part; edges whose two ends both stay whole get midpoints and part in the next.
   for (int round = 0; round < 3; ++round) {

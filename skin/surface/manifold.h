@@ -7,8 +7,8 @@
 namespace effuse::skin {
 
 struct ManifoldReport {
-  std::size_t split_edges = 0;     ///< edges of four or more triangles, parted
-  std::size_t split_vertices = 0;  ///< copies of vertices made
+  std::size_t split_edges = 0;        ///< edges of four or more triangles, parted
+  std::size_t split_vertices = 0;     ///< copies of vertices made
   std::size_t dropped_triangles = 0;  ///< named a vertex twice
 };
 

@@ -27,9 +27,10 @@ void check_input(const geometry::Points& points, Real voxel) {
     box.extend(points.position[i]);
   }
   if (n > 0 && box.sizes().maxCoeff() > kFarthest * voxel)
-    throw InputError(Place{"particles"}, fmt::format("spread over {:.4g} m: more than {:.0f} voxels of {:.4g} m. Wanted a larger voxel, or particles "
-                                                     "closer together (is one astray?)",
-                                                     box.sizes().maxCoeff(), kFarthest, voxel));
+    throw InputError(Place{"particles"},
+                     fmt::format("spread over {:.4g} m: more than {:.0f} voxels of {:.4g} m. Wanted a larger voxel, or particles "
+                                 "closer together (is one astray?)",
+                                 box.sizes().maxCoeff(), kFarthest, voxel));
 }
 }  // namespace
 
@@ -119,7 +120,8 @@ ParticleGrid::ParticleGrid(const geometry::Points& points, Real voxel, Real side
 int ParticleGrid::column_of(Real v) const { return static_cast<int>(std::floor(v / side_)); }
 
 Index ParticleGrid::first_above(const Column& column, Real z) const {
-  const auto first = std::upper_bound(x_.begin() + column.begin, x_.begin() + column.end, z, [](Real height, const Vec3& p) { return height < p.z(); });
+  const auto first =
+      std::upper_bound(x_.begin() + column.begin, x_.begin() + column.end, z, [](Real height, const Vec3& p) { return height < p.z(); });
   return static_cast<Index>(first - x_.begin());
 }
 
@@ -141,7 +143,8 @@ struct Nearby {
 };
 
 /// Weighted mean of the nearby numbers at (x, y, z); false when none is within reach. chosen: scratch, larger than nearby.
-EFFUSE_CLONES bool weighted_mean(const Nearby& near, float x, float y, float z, float reach, std::vector<std::pair<Index, float>>& chosen, Carry& mean) {
+EFFUSE_CLONES bool weighted_mean(const Nearby& near, float x, float y, float z, float reach, std::vector<std::pair<Index, float>>& chosen,
+                                 Carry& mean) {
   const float inverse = 1 / (reach * reach);
   std::size_t n = 0;
   for (std::size_t i = 0; i < near.x.size(); ++i) {
@@ -214,7 +217,9 @@ void ParticleGrid::average(std::span<const Vec3> points, Real reach, std::span<f
         for (std::size_t m = 0; m < mine.size(); ++m) {
           if (found[m]) continue;
           const Vec3 p = points[mine[m]] - low;
-          if (!weighted_mean(near, static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z()), static_cast<float>(r), chosen, mean)) continue;
+          if (!weighted_mean(near, static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z()), static_cast<float>(r),
+                             chosen, mean))
+            continue;
           found[m] = 1;
           --missing;
           for (std::size_t a = 0; a < width; ++a) out[mine[m] * width + a] = values(first)[a] + mean[a];

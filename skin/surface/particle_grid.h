@@ -21,7 +21,7 @@ class ParticleGrid {
   std::size_t size() const { return x_.size(); }
   /// A multiple of 8 voxels [m], near the particles' middle: floats count from here, and frames share one lattice.
   const Vec3& origin() const { return origin_; }
-  const std::vector<Vec3>& x() const { return x_; }       ///< sorted [voxels]
+  const std::vector<Vec3>& x() const { return x_; }             ///< sorted [voxels]
   const std::vector<float>& radius() const { return radius_; }  ///< sorted [voxels]
 
   struct Column {

@@ -11,6 +11,9 @@ namespace effuse::skin {
 
 namespace {
 
+/// Particles farther from a point than this do not make it lava [spacings]: a sheet on a square lattice stays whole up to
+/// 1.6 spacings between its particles, and lobes closer than 2.5 from particle to particle join.
+constexpr float kBound = 1.15f;
 /// Steeper than a distance, so that shifting the surface by half a spacing moves the bound by a sixth only.
 constexpr float kBoundSlope = 3;
 
@@ -83,7 +86,7 @@ EFFUSE_CLONES void gather_block(const Candidates& near, Narrowed& slab, Narrowed
         phi[v] = o.outside;
         if (W[k] < 1e-9f) continue;
         const float to_mean = std::sqrt(wx[k] * wx[k] + wy[k] * wy[k] + wz[k] * wz[k]) / W[k];
-        const float bound = kBoundSlope * (std::sqrt(nearest[k]) - o.spacing);
+        const float bound = kBoundSlope * (std::sqrt(nearest[k]) - kBound * o.spacing);
         phi[v] = std::min(o.outside, std::max(to_mean - o.radius_factor * wr[k] / W[k], bound));
       }
     }
@@ -165,7 +168,7 @@ Real zhu_bridson(const ParticleGrid& particles, const RasterOptions& options, co
     nearest = std::min(nearest, d.norm());
   }
   if (W < 1e-9) return options.outside;
-  const Real bound = static_cast<Real>(kBoundSlope) * (nearest - static_cast<Real>(options.spacing));
+  const Real bound = static_cast<Real>(kBoundSlope) * (nearest - static_cast<Real>(kBound * options.spacing));
   return std::min<Real>(options.outside, std::max((wx / W).norm() - static_cast<Real>(options.radius_factor) * wr / W, bound));
 }
 

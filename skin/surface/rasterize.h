@@ -7,10 +7,10 @@ namespace effuse::skin {
 
 /// All lengths in voxels.
 struct RasterOptions {
-  float reach = 4;        ///< R: a particle is felt this far
-  float spacing = 2;      ///< of the particles
+  float reach = 4;             ///< R: a particle is felt this far
+  float spacing = 2;           ///< of the particles
   float radius_factor = 1.2f;  ///< rbar in units of the particles' own radii
-  float outside = 2.8f;   ///< values are cut here
+  float outside = 2.8f;        ///< values are cut here
 };
 
 /// The blocks with a voxel closer than reach to a particle.
@@ -19,7 +19,7 @@ Blocks blocks_around(const ParticleGrid& particles, Real reach);
 /// Zhu & Bridson's field with the bound between separate particles (build_level_set's docstring):
 ///
 ///   w_i = max(0, 1 - |x - x_i|^2 / R^2)^3        W = sum w_i
-///   phi = max(|x - sum w_i x_i / W| - sum w_i r_i / W,  3 (min |x - x_i| - spacing)),   at most `outside`
+///   phi = max(|x - sum w_i x_i / W| - sum w_i r_i / W,  3 (min |x - x_i| - 1.15 spacing)),   at most `outside`
 ///
 ///   phi     out: the field [voxels]
 ///   weight  out: W

@@ -43,7 +43,8 @@ void smooth(const Blocks& blocks, float outside, float time, const Field& weight
                 const float g2 = x * x + y * y + z * z;
                 if (g2 < 0.04f) continue;
                 // kappa |grad phi| = laplacian - second derivative along the normal
-                const float change = xx + yy + zz - (x * x * xx + y * y * yy + z * z * zz + 2 * (x * y * xy + x * z * xz + y * z * yz)) / g2;
+                const float change =
+                    xx + yy + zz - (x * x * xx + y * y * yy + z * z * zz + 2 * (x * y * xy + x * z * xz + y * z * yz)) / g2;
                 out[v] = old[v] + ramp * ramp * (3 - 2 * ramp) * dt * std::clamp(change, -1.5f, 1.5f);
               }
         },

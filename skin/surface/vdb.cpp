@@ -1,7 +1,6 @@
+#include <fmt/format.h>
 #include <openvdb/io/File.h>
 #include <openvdb/openvdb.h>
-
-#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -34,8 +33,8 @@ std::string brief(const char* words) {
 /// Blocks as a grid of OpenVDB in the world. value(block, voxel) and on(block, voxel); blocks of nothing on are left out,
 /// or a tile `deep` if every value is that.
 template <class Grid, class Value, class On>
-typename Grid::Ptr make_grid(const LevelSet::Impl& s, const char* name, openvdb::GridClass kind, const typename Grid::ValueType& background, Value&& value,
-                             On&& on) {
+typename Grid::Ptr make_grid(const LevelSet::Impl& s, const char* name, openvdb::GridClass kind, const typename Grid::ValueType& background,
+                             Value&& value, On&& on) {
   using Leaf = typename Grid::TreeType::LeafNodeType;
   auto grid = Grid::create(background);
   grid->setName(name);
@@ -106,7 +105,8 @@ openvdb::GridPtrVec grids_of(const LevelSet::Impl& s) {
   };
   if (carried.temperature >= 0 || s.blocks.size() == 0)
     grids.push_back(make_grid<openvdb::FloatGrid>(
-        s, "temperature", openvdb::GRID_FOG_VOLUME, 0.0f, [&](std::size_t i) { return wanted(i) ? at(i, carried.temperature) : 0.0f; }, wanted));
+        s, "temperature", openvdb::GRID_FOG_VOLUME, 0.0f, [&](std::size_t i) { return wanted(i) ? at(i, carried.temperature) : 0.0f; },
+        wanted));
   if (carried.velocity >= 0 || s.blocks.size() == 0) {
     auto velocity = make_grid<openvdb::Vec3SGrid>(
         s, "velocity", openvdb::GRID_UNKNOWN, openvdb::Vec3s(0),
@@ -129,13 +129,15 @@ void name_by_content(const fs::path& file) {
   constexpr std::size_t kLength = 36;
   std::string bytes = read_file(file);
   // A layout we do not know: better a random name than a damaged file.
-  if (bytes.size() < kAt + kLength || bytes[kAt + 8] != '-' || bytes[kAt + 13] != '-' || bytes[kAt + 18] != '-' || bytes[kAt + 23] != '-') return;
+  if (bytes.size() < kAt + kLength || bytes[kAt + 8] != '-' || bytes[kAt + 13] != '-' || bytes[kAt + 18] != '-' || bytes[kAt + 23] != '-')
+    return;
   bytes.replace(kAt, kLength, kLength, '0');
   StateHash first, second;
   first.add(std::string_view(bytes));
   second.add(first.value());
   const std::string hex = first.hex() + second.hex();
-  const std::string uuid = fmt::format("{}-{}-4{}-8{}-{}", hex.substr(0, 8), hex.substr(8, 4), hex.substr(12, 3), hex.substr(15, 3), hex.substr(18, 12));
+  const std::string uuid =
+      fmt::format("{}-{}-4{}-8{}-{}", hex.substr(0, 8), hex.substr(8, 4), hex.substr(12, 3), hex.substr(15, 3), hex.substr(18, 12));
   std::fstream out(file, std::ios::in | std::ios::out | std::ios::binary);
   out.seekp(kAt);
   out.write(uuid.data(), kLength);
@@ -167,7 +169,8 @@ void write_vdb(const fs::path& file, const LevelSet& surface, const std::vector<
     names = check_vdb_layout(out.temporary());
   } catch (const InputError&) {
   }
-  if (names.size() != grids.size()) throw ResourceError(fmt::format("{}: what was written does not read back: is the disk full?", file.string()));
+  if (names.size() != grids.size())
+    throw ResourceError(fmt::format("{}: what was written does not read back: is the disk full?", file.string()));
   name_by_content(out.temporary());
   out.commit();
 }
@@ -183,14 +186,17 @@ std::vector<std::string> describe_vdb(const fs::path& file) {
     const openvdb::GridPtrVecPtr grids = in.readAllGridMetadata();
     for (const openvdb::GridBase::Ptr& grid : *grids) {
       std::string line = fmt::format("{}: {}, {}, voxel {:.6g} m", brief(grid->getName().c_str()),
-                                     openvdb::GridBase::gridClassToMenuName(grid->getGridClass()), brief(grid->valueType().c_str()), grid->voxelSize().x());
+                                     openvdb::GridBase::gridClassToMenuName(grid->getGridClass()), brief(grid->valueType().c_str()),
+                                     grid->voxelSize().x());
       if (const auto count = grid->getMetadata<openvdb::Int64Metadata>(openvdb::GridBase::META_FILE_VOXEL_COUNT))
         line += fmt::format(", {} active voxels", count->value());
       const auto min = grid->getMetadata<openvdb::Vec3IMetadata>(openvdb::GridBase::META_FILE_BBOX_MIN);
       const auto max = grid->getMetadata<openvdb::Vec3IMetadata>(openvdb::GridBase::META_FILE_BBOX_MAX);
       if (min && max && min->value().x() <= max->value().x()) {
-        const openvdb::Vec3d low = grid->indexToWorld(openvdb::Coord(min->value())), high = grid->indexToWorld(openvdb::Coord(max->value()));
-        line += fmt::format(", bounds ({:.6g}, {:.6g}, {:.6g}) to ({:.6g}, {:.6g}, {:.6g})", low.x(), low.y(), low.z(), high.x(), high.y(), high.z());
+        const openvdb::Vec3d low = grid->indexToWorld(openvdb::Coord(min->value())),
+                             high = grid->indexToWorld(openvdb::Coord(max->value()));
+        line += fmt::format(", bounds ({:.6g}, {:.6g}, {:.6g}) to ({:.6g}, {:.6g}, {:.6g})", low.x(), low.y(), low.z(), high.x(), high.y(),
+                            high.z());
       }
       lines.push_back(std::move(line));
     }

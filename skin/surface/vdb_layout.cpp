@@ -79,7 +79,8 @@ std::vector<std::string> check_vdb_layout(const fs::path& file) {
   if (fs::is_directory(file)) throw InputError(Place{file.string()}, "is a folder, wanted a file");
   Walker walk(file);
   constexpr std::uint64_t kMagic = 0x56444220;
-  if (walk.size() < 8 || walk.number<std::uint64_t>("the first word") != kMagic) walk.refuse("not an OpenVDB file: it does not begin with ' BDV'");
+  if (walk.size() < 8 || walk.number<std::uint64_t>("the first word") != kMagic)
+    walk.refuse("not an OpenVDB file: it does not begin with ' BDV'");
 
   constexpr std::uint32_t kFirstVersion = 222;
   const auto version = walk.number<std::uint32_t>("the version");

@@ -18,15 +18,19 @@ float negative_share(const std::array<float, 4>& v) {
   for (const float x : v) (x < 0 ? n[negative++] : p[positive++]) = x;
   const auto cut = [](float a, float b) { return a / (a - b); };  // how far along a -> b the zero lies
   switch (negative) {
-    case 0: return 0;
-    case 1: return cut(n[0], p[0]) * cut(n[0], p[1]) * cut(n[0], p[2]);
+    case 0:
+      return 0;
+    case 1:
+      return cut(n[0], p[0]) * cut(n[0], p[1]) * cut(n[0], p[2]);
     case 2: {
       // A prism between the two negative corners, in three tetrahedra.
       const float a = cut(n[0], p[0]), b = cut(n[0], p[1]), c = cut(n[1], p[0]), d = cut(n[1], p[1]);
       return a * b + c * d * (1 - a) + a * d * (1 - b);
     }
-    case 3: return 1 - cut(p[0], n[0]) * cut(p[0], n[1]) * cut(p[0], n[2]);
-    default: return 1;
+    case 3:
+      return 1 - cut(p[0], n[0]) * cut(p[0], n[1]) * cut(p[0], n[2]);
+    default:
+      return 1;
   }
 }
 

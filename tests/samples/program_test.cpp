@@ -50,7 +50,6 @@ class ProgramTest : public testing::Test {
     if (pid == 0) {
       if (!::freopen(out.c_str(), "w", stdout) || !::freopen(err.c_str(), "w", stderr)) ::_exit(99);
       if (largest_file != RLIM_INFINITY) {
-        ::signal(SIGXFSZ, SIG_IGN);
         const rlimit limit{largest_file, largest_file};
         ::setrlimit(RLIMIT_FSIZE, &limit);
       }
@@ -175,11 +174,34 @@ TEST_F(ProgramTest, RefusesAVentBesideTheTerrain) {
   EXPECT_NE(outcome.err.find("not on the terrain"), std::string::npos) << outcome.err;
 }
 
+TEST_F(ProgramTest, RefusesAtOnceWhatWouldNeverEndOrFitInMemory) {
+  for (const char* slip : {"lava.spacing=1 mm", "lava.vent[0].width=1e9", "lava.vent[0].rate=1e30", "lava.max_step=1e-30", "lava.stiffness=1e30", "film.time_scale=1e308",
+                           "lava.air_exchange=1e300", "lava.diffusivity=1e300", "lava.rest_period=1e-300"}) {
+    const Outcome outcome = effuse({"check", kScenes / "lava.toml", "--set", slip});
+    EXPECT_EQ(outcome.code, 2) << slip << ": " << outcome.out << outcome.err;
+    EXPECT_EQ(count(outcome.err, "error: "), 1u) << slip << ": " << outcome.err;
+  }
+  // A fissure a million kilometres long and a hair wide.
+  EXPECT_EQ(effuse({"check", kScenes / "lava.toml", "--set", "lava.vent[0]={from=[18,46],to=[1e9,46],width=1e-9,rate=1}"}).code, 2);
+}
+
+TEST_F(ProgramTest, TellsOfAVentAtAPointAndAlongALineOnce) {
+  const Outcome outcome = effuse({"check", kScenes / "lava.toml", "--set", "lava.vent[0].from=[18, 46]", "--set", "lava.vent[0].to=[20, 46]"});
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_EQ(count(outcome.err, "error: "), 1u) << outcome.err;
+}
+
 TEST_F(ProgramTest, NamesTheNearestVerbAndRefusesAnUnknownFlag) {
   const Outcome verb = effuse({"chekc", "x.toml"});
   EXPECT_EQ(verb.code, 2);
   EXPECT_NE(verb.err.find("did you mean 'check'"), std::string::npos) << verb.err;
   EXPECT_EQ(effuse({"run", kScenes / "lava.toml", "--framse", "3"}).code, 2);
+  // --json is kept when nothing else is right.
+  for (const Arguments& wrong : {Arguments{"chekc", "x.toml", "--json"}, Arguments{"run", "--json", "--framse", "3"}, Arguments{"run", "--frames", "0", "--json", "x.toml"}}) {
+    const Outcome outcome = effuse(wrong);
+    EXPECT_EQ(outcome.code, 2);
+    EXPECT_EQ(nlohmann::json::parse(outcome.out).at("exit_code"), 2) << outcome.out;
+  }
   EXPECT_EQ(effuse({"--help"}).code, 0);
 }
 
@@ -214,6 +236,9 @@ TEST_F(ProgramTest, KilledInTheMidstOfAFrameItGoesOnToTheSameBytes) {
   EXPECT_NE(resumed.err.find("going on after frame"), std::string::npos) << resumed.err;
   expect_same_files(whole, broken, 12 * 4);
   EXPECT_EQ(run_json(whole).at("frames"), run_json(broken).at("frames"));
+  // The figures are the whole run's, not those of the part after the checkpoint.
+  for (const char* figure : {"particles", "mass_emitted_kg", "steps", "smallest_step_s", "retries", "max_speed_m_s"})
+    EXPECT_EQ(run_json(whole).at("effects").at("lava").at(figure), run_json(broken).at("effects").at("lava").at(figure)) << figure;
 }
 
 TEST_F(ProgramTest, InterruptedItCheckpointsAndSaysHowToGoOn) {
@@ -228,7 +253,11 @@ TEST_F(ProgramTest, InterruptedItCheckpointsAndSaysHowToGoOn) {
   const Outcome outcome = wait(pid);
   EXPECT_EQ(outcome.code, 130) << outcome.err;
   EXPECT_NE(outcome.err.find("--resume"), std::string::npos) << outcome.err;
-  ASSERT_EQ(effuse(run_gully(broken, 10, {"--resume"})).code, 0);
+  // The line it prints is the one that works: with the frames and the overrides of the run.
+  const std::size_t at = outcome.err.find("effuse run ");
+  ASSERT_NE(at, std::string::npos) << outcome.err;
+  const std::string line = outcome.err.substr(at + 6, outcome.err.find('\n', at) - at - 6);
+  ASSERT_EQ(std::system(fmt::format("'{}'{} --quiet", EFFUSE_PROGRAM, line).c_str()), 0) << line;
   expect_same_files(whole, broken, 10 * 4);
 }
 
@@ -268,6 +297,167 @@ TEST_F(ProgramTest, DescribesItsOwnFiles) {
   // The resolved scene is a scene: it checks, and says the same again.
   fs::copy_file(kScenes / "gully.asc", out / "gully.asc");
   EXPECT_EQ(effuse({"check", out / "scene.toml"}).code, 0);
+}
+
+TEST_F(ProgramTest, FallsBackOnTheCheckpointBeforeADamagedOne) {
+  const fs::path whole = folder_ / "whole", broken = folder_ / "broken";
+  ASSERT_EQ(effuse(run_gully(whole, 9)).code, 0);
+  ASSERT_EQ(effuse(run_gully(broken, 7)).code, 0);
+  const fs::path newest = broken / "checkpoints" / "checkpoint.0007.state", before = broken / "checkpoints" / "checkpoint.0006.state";
+  std::string bytes = read_file(newest);
+  bytes[bytes.size() / 2] ^= 1;
+  write_file(newest, bytes);
+  write_file(broken / "checkpoints" / "checkpoint.old.state", "not one of ours");
+  const Outcome resumed = effuse(run_gully(broken, 9, {"--resume"}));
+  ASSERT_EQ(resumed.code, 0) << resumed.err;
+  EXPECT_NE(resumed.err.find("checkpoint.0007.state is damaged"), std::string::npos) << resumed.err;
+  EXPECT_NE(resumed.err.find("going on after frame 6"), std::string::npos) << resumed.err;
+  expect_same_files(whole, broken, 9 * 4);
+  EXPECT_EQ(run_json(whole).at("frames"), run_json(broken).at("frames"));
+
+  for (const fs::directory_entry& entry : fs::directory_iterator(broken / "checkpoints")) write_file(entry.path(), "");
+  const Outcome none = effuse(run_gully(broken, 12, {"--resume"}));
+  EXPECT_EQ(none.code, 2);
+  EXPECT_NE(none.err.find("every checkpoint is damaged"), std::string::npos) << none.err;
+  expect_same_files(whole, broken, 9 * 4);
+}
+
+TEST_F(ProgramTest, TwoRunsDoNotWriteIntoOneFolder) {
+  const fs::path out = folder_ / "out";
+  const pid_t pid = start(run_gully(out, 200));
+  while (!fs::exists(out / "frames" / "lava.0001.vdb")) {
+    ASSERT_EQ(::waitpid(pid, nullptr, WNOHANG), 0) << "it ended by itself";
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  for (const char* how : {"--resume", "--force"}) {
+    const Outcome second = effuse(run_gully(out, 200, {how}));
+    EXPECT_EQ(second.code, 2);
+    EXPECT_NE(second.err.find("another effuse is writing"), std::string::npos) << second.err;
+  }
+  EXPECT_TRUE(fs::exists(out / "frames" / "lava.0001.vdb"));
+  ::kill(pid, SIGHUP);  // the terminal closes: as Ctrl-C
+  EXPECT_EQ(wait(pid).code, 130);
+}
+
+TEST_F(ProgramTest, TheLineThatResumesIsAWholeCommand) {
+  const fs::path out = folder_ / "it's here";
+  const pid_t pid = start(run_gully(out, 200));
+  while (!fs::exists(out / "frames" / "lava.0002.vdb")) {
+    ASSERT_EQ(::waitpid(pid, nullptr, WNOHANG), 0) << "it ended by itself";
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  ::kill(pid, SIGTERM);
+  const Outcome outcome = wait(pid);
+  ASSERT_EQ(outcome.code, 130);
+  EXPECT_NE(outcome.err.find(R"(it'\''s here' --frames 200 --set 'lava.spacing=1.2 m')"), std::string::npos) << outcome.err;
+}
+
+TEST_F(ProgramTest, RefusesNumbersThatWouldNeverEndOrBreakTheFiles) {
+  const fs::path out = folder_ / "out";
+  for (const char* set : {"lava.spacing=1e-9", "lava.spacing=1e-300", "lava.vent[0].rate=1e300", "lava.vent[0].width=1e9", "lava.vent[0].width=100", "lava.vent[0].at=[2,50]", "lava.vent[0].at=[1e300,1]",
+                          "film.time_scale=1e300", "film.fps=1e-300", "lava.max_step=1e-12", "lava.courant=1e-300", "lava.ground_exchange=1e300", "lava.diffusivity=1e9", "lava.air_temperature=1e6",
+                          "terrain.temperature=1e300", "skin.glow=1e300", "skin.amplitude=1e300", "preview.view=[1e300,0,1]", "preview.view=[0,0,1e300]", "terrain.file=\"\"", "terrain.file=\"a\\u0000b\""}) {
+    const Outcome outcome = effuse(run_gully(out, 2, {"--set", set}));
+    EXPECT_EQ(outcome.code, 2) << set << "\n" << outcome.err;
+    EXPECT_LT(outcome.err.size(), 600u) << set;
+    EXPECT_FALSE(fs::exists(out)) << set;
+  }
+  // Nothing comes out: allowed, and said.
+  const Outcome dry = effuse(run_gully(out, 2, {"--set", "lava.vent[0].rate=0"}));
+  EXPECT_EQ(dry.code, 0) << dry.err;
+  EXPECT_NE(dry.err.find("not one particle"), std::string::npos) << dry.err;
+}
+
+TEST_F(ProgramTest, RefusesAnOutputThatIsNoFolder) {
+  write("file", "x");
+  fs::create_symlink("nowhere", folder_ / "dangling");
+  fs::create_symlink("loop", folder_ / "loop");
+  for (const fs::path& out : {folder_ / "file", folder_ / "file" / "below", folder_ / "dangling", folder_ / "loop", folder_ / std::string(300, 'a'), fs::path("/proc/effuse")}) {
+    const Outcome outcome = effuse(run_gully(out, 2));
+    EXPECT_EQ(outcome.code, 2) << out << outcome.err;
+    EXPECT_EQ(count(outcome.err, "error: "), 1u) << outcome.err;
+  }
+  EXPECT_EQ(read_file(folder_ / "file"), "x");
+  EXPECT_EQ(effuse({"info", folder_ / "loop"}).code, 2);
+}
+
+TEST_F(ProgramTest, GoesOnWithoutAnybodyWhoListens) {
+  const auto shell = [&](const Arguments& arguments, const std::string& redirection) {
+    std::string line = EFFUSE_PROGRAM;
+    for (const std::string& word : arguments) line += " '" + word + "'";
+    const int status = std::system((line + " " + redirection).c_str());
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+  };
+  const fs::path whole = folder_ / "whole";
+  ASSERT_EQ(effuse(run_gully(whole, 4)).code, 0);
+  int n = 0;
+  for (const char* redirection : {"2>/dev/full", "2>&-", "<&- >&- 2>&-", "2>&1 | head -n 1 >/dev/null"}) {
+    const fs::path out = folder_ / std::to_string(n++);
+    EXPECT_EQ(shell(run_gully(out, 4), redirection), 0) << redirection;
+    expect_same_files(whole, out, 4 * 4);
+    EXPECT_EQ(read_file(out / "scene.toml"), read_file(whole / "scene.toml"));
+  }
+  EXPECT_EQ(shell({"check", kScenes / "lava.toml"}, ">/dev/full 2>/dev/null"), 5);
+  EXPECT_EQ(shell({"effects", "--json"}, ">/dev/full 2>/dev/null"), 5);
+}
+
+TEST_F(ProgramTest, TakesNamesThatAreNotUtf8) {
+  fs::copy_file(kScenes / "gully.asc", folder_ / "gully.asc");
+  write("gully.prj", "PROJCS[\"R\xe9union\",GEOGCS[\"x\"],UNIT[\"metre\",1]]");
+  const fs::path scene = write("sc\xe8ne.toml", "name = \"\xf0\x9f\x8c\x8b \\n \\u0000\"\n" + read_file(kScenes / "lava.toml").substr(read_file(kScenes / "lava.toml").find("\n[film]")));
+  const fs::path out = folder_ / "\xe9t\xe9";
+  const Outcome outcome = effuse({"run", scene, "-o", out, "--frames", "2", "--set", "lava.spacing=1.2 m", "--set", "preview.pictures=false", "--json"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(nlohmann::json::parse(outcome.out).at("outcome"), "done");
+  EXPECT_NE(nlohmann::json::parse(read_file(out / "manifest.json")).at("crs").get<std::string>().find("R\xc3\xa9union"), std::string::npos);
+  for (const Arguments& more : {Arguments{}, Arguments{"--json"}}) {
+    Arguments arguments = {"info", out, scene, out / "terrain.ply", out / "frames" / "skin.0002.glb", folder_ / "gully.asc"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    EXPECT_EQ(effuse(arguments).code, 0);
+  }
+}
+
+/// The real scene at full resolution, for 40 of its frames.
+class ProgramSlow : public ProgramTest {
+ protected:
+  static Arguments run_mountain(const fs::path& out, const Arguments& more = {}) {
+    Arguments arguments = {"run", kScenes / "maunga-whau.toml", "-o", out, "--frames", "40", "--set", "output.checkpoint_every=20", "--set", "preview.width=320", "--set",
+                           "preview.height=180"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  }
+};
+
+TEST_F(ProgramSlow, MaungaWhauKilledAfterFrameTwentyGoesOnToTheSameFortyFrames) {
+  const fs::path whole = folder_ / "whole", broken = folder_ / "broken";
+  const Outcome outcome = effuse(run_mountain(whole));
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const pid_t pid = start(run_mountain(broken));
+  while (!fs::exists(broken / "preview" / "preview.0027.png")) {
+    ASSERT_EQ(::waitpid(pid, nullptr, WNOHANG), 0) << "it ended by itself";
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  ::kill(pid, SIGKILL);
+  EXPECT_EQ(wait(pid).code, -SIGKILL);
+  const Outcome resumed = effuse(run_mountain(broken, {"--resume"}));
+  ASSERT_EQ(resumed.code, 0) << resumed.err;
+  EXPECT_NE(resumed.err.find("going on after frame 20"), std::string::npos) << resumed.err;
+  expect_same_files(whole, broken, 40 * 5);
+  EXPECT_EQ(run_json(whole).at("frames"), run_json(broken).at("frames"));
+
+  // The run says where its time went, and most of it went into physics or the skin.
+  std::string largest;
+  double most = 0;
+  const nlohmann::json report = run_json(whole), &zones = report.at("zones");
+  for (const auto& [name, zone] : zones.items()) {
+    const double self = zone.at("self_s").get<double>();
+    if (self > most) {
+      most = self;
+      largest = name;
+    }
+  }
+  EXPECT_TRUE(largest.starts_with("sph.") || largest.starts_with("skin.") || largest.starts_with("terrain.")) << largest << " took " << most << " s";
+  EXPECT_NE(outcome.err.find("sph.forces"), std::string::npos) << "no table of zones";
 }
 
 }  // namespace

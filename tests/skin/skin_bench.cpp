@@ -26,7 +26,8 @@ struct Lava {
 
   explicit Lava(std::size_t n, int layers) {
     const Real size = static_cast<Real>(n);
-    const int height = layers > 0 ? layers : static_cast<int>(std::lround(std::cbrt(size))), across = static_cast<int>(std::lround(std::sqrt(size / height)));
+    const int height = layers > 0 ? layers : static_cast<int>(std::lround(std::cbrt(size))),
+              across = static_cast<int>(std::lround(std::sqrt(size / height)));
     for (int i = 0; i < across; ++i)
       for (int j = 0; j < across; ++j)
         for (int k = 0; k < height; ++k) {
@@ -77,7 +78,8 @@ void open_vdb_smooth_spheres(benchmark::State& state) {
     const auto transform = openvdb::math::Transform::createLinearTransform(0.5);
     const openvdb::points::PointAttributeVector<openvdb::Vec3R> wrapper(positions);
     const auto index = openvdb::tools::createPointIndexGrid<openvdb::tools::PointIndexGrid>(wrapper, *transform);
-    const auto grid = openvdb::points::createPointDataGrid<openvdb::points::NullCodec, openvdb::points::PointDataGrid>(*index, wrapper, *transform);
+    const auto grid =
+        openvdb::points::createPointDataGrid<openvdb::points::NullCodec, openvdb::points::PointDataGrid>(*index, wrapper, *transform);
     voxels = openvdb::points::rasterizeSmoothSpheres(*grid, 0.6, 2.0)->activeVoxelCount();
   }
   finish(state, lava, voxels);

@@ -23,7 +23,8 @@ using testing_shapes::fill;
 
 /// Skin of a ball of lava, spacing 0.5, all of it at that temperature.
 TriMesh ball(Real radius = 6, float temperature = 1000, const geometry::Terrain* terrain = nullptr) {
-  const Cloud cloud = fill(cube(radius), 0.5, [&](const Vec3& p) { return p.norm() < radius - 0.25 && (!terrain || terrain->signed_distance(p) > 0.25); });
+  const Cloud cloud =
+      fill(cube(radius), 0.5, [&](const Vec3& p) { return p.norm() < radius - 0.25 && (!terrain || terrain->signed_distance(p) > 0.25); });
   LevelSetOptions options;
   options.spacing = 0.5;
   TriMesh mesh = mesh_level_set(build_level_set(cloud.points(), cloud.volume(), terrain, options));

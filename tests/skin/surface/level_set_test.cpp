@@ -14,12 +14,12 @@
 namespace effuse::skin {
 namespace {
 
-using testing_shapes::Cloud;
-using testing_shapes::cube;
-using testing_shapes::fill;
 using geometry::HeightField;
 using geometry::Terrain;
 using geometry::TriMesh;
+using testing_shapes::Cloud;
+using testing_shapes::cube;
+using testing_shapes::fill;
 
 LevelSetOptions at_spacing(Real spacing) {
   LevelSetOptions options;
@@ -65,11 +65,13 @@ std::ostream& operator<<(std::ostream& out, const Shape& s) { return out << s.na
 
 const Shape kShapes[] = {
     {"sphere", [](const Vec3& p) { return p.norm() - 8; }, 9, 4.0 / 3 * kPi * 512},
-    {"slab_with_round_edges", [](const Vec3& p) {
+    {"slab_with_round_edges",
+     [](const Vec3& p) {
        const Vec3 q = p.cwiseAbs() - Vec3(11, 9, 0.5);
        return q.cwiseMax(0).norm() + std::min(0.0, q.maxCoeff()) - 1;
-     }, 13, 396 + 2 * 436 + 41 * kPi + 4 * kPi / 3},
-    {"torus", [](const Vec3& p) { return std::hypot(std::hypot(p.x(), p.y()) - 9, p.z()) - 4; }, 14, 2 * kPi * kPi * 9 * 16},
+     },
+     13, 396 + 2 * 436 + 41 * kPi + 4 * kPi / 3},
+    {"torus", [](const Vec3& p) { return std::hypot(std::hypot(p.x(), p.y()) - 9, p.z()) - 4; }, 14, 2 * kPi* kPi * 9 * 16},
 };
 
 class LevelSetShape : public testing::TestWithParam<Shape> {};
@@ -78,7 +80,8 @@ TEST_P(LevelSetShape, EnclosesItsVolumeAndStaysWithinHalfASpacingOfTheTrueSurfac
   const Shape& shape = GetParam();
   // Particles half a spacing inside the true surface at least, as particles of a fluid are.
   const Real d = 0.5;
-  const Cloud cloud = fill(cube(shape.half), d, [&](const Vec3& p) { return shape.distance(p) < -0.25 * d; }, 0.1);
+  const Cloud cloud = fill(
+      cube(shape.half), d, [&](const Vec3& p) { return shape.distance(p) < -0.25 * d; }, 0.1);
   const LevelSet surface = build_level_set(cloud.points(), shape.volume, nullptr, at_spacing(d));
   const TriMesh mesh = mesh_level_set(surface);
 
@@ -100,7 +103,8 @@ TEST_P(LevelSetShape, EnclosesItsVolumeAndStaysWithinHalfASpacingOfTheTrueSurfac
     Vec3 p = shape.half * Vec3(2 * random_uniform(7, 0, i) - 1, 2 * random_uniform(7, 1, i) - 1, 2 * random_uniform(7, 2, i) - 1);
     for (int step = 0; step < 20; ++step) {
       const Real e = 1e-5, f = shape.distance(p);
-      const Vec3 g((shape.distance(p + Vec3(e, 0, 0)) - f) / e, (shape.distance(p + Vec3(0, e, 0)) - f) / e, (shape.distance(p + Vec3(0, 0, e)) - f) / e);
+      const Vec3 g((shape.distance(p + Vec3(e, 0, 0)) - f) / e, (shape.distance(p + Vec3(0, e, 0)) - f) / e,
+                   (shape.distance(p + Vec3(0, 0, e)) - f) / e);
       p -= f * g;
     }
     if (std::abs(shape.distance(p)) < 1e-3) farthest = std::max(farthest, nearest(mesh.positions, p));
@@ -116,7 +120,8 @@ TEST_P(LevelSetShape, EnclosesItsVolumeAndStaysWithinHalfASpacingOfTheTrueSurfac
     }
   }
 }
-INSTANTIATE_TEST_SUITE_P(All, LevelSetShape, testing::ValuesIn(kShapes), [](const auto& instance) { return std::string(instance.param.name); });
+INSTANTIATE_TEST_SUITE_P(All, LevelSetShape, testing::ValuesIn(kShapes),
+                         [](const auto& instance) { return std::string(instance.param.name); });
 
 TEST(LevelSet, OfNoParticlesIsEmpty) {
   const LevelSet surface = build_level_set({}, 0, nullptr, at_spacing(1));
@@ -129,16 +134,19 @@ TEST(LevelSet, OfNoParticlesIsEmpty) {
 }
 
 TEST(LevelSet, SheetOneParticleThickHasNoHole) {
-  // Spacing stretched to 1.3 and jittered: still one closed piece without a handle.
-  for (const Real stretch : {1.0, 1.15, 1.3}) {
+  // Spacing stretched to 1.5 and jittered: still one closed piece without a handle.
+  for (const Real stretch : {1.0, 1.15, 1.3, 1.5}) {
     Cloud cloud;
     std::uint64_t n = 0;
     for (int i = 0; i < 20; ++i)
       for (int j = 0; j < 20; ++j, ++n)
-        cloud.add(Vec3(stretch * i + 0.08 * random_uniform(3, 0, n), stretch * j + 0.08 * random_uniform(3, 1, n), 0.1 * random_uniform(3, 2, n)), 1);
+        cloud.add(
+            Vec3(stretch * i + 0.08 * random_uniform(3, 0, n), stretch * j + 0.08 * random_uniform(3, 1, n), 0.1 * random_uniform(3, 2, n)),
+            1);
     LevelSetOptions options = at_spacing(1);
     options.match_volume = stretch == 1;  // a stretched sheet has more volume than its particles
-    const geometry::MeshReport report = geometry::validate(mesh_level_set(build_level_set(cloud.points(), cloud.volume(), nullptr, options)));
+    const geometry::MeshReport report =
+        geometry::validate(mesh_level_set(build_level_set(cloud.points(), cloud.volume(), nullptr, options)));
     EXPECT_TRUE(report.solid());
     EXPECT_EQ(report.components, 1u) << stretch;
     EXPECT_EQ(report.euler, 2) << "stretch " << stretch << ": a hole through it";
@@ -147,7 +155,7 @@ TEST(LevelSet, SheetOneParticleThickHasNoHole) {
 
 TEST(LevelSet, SeparateParticlesStaySeparateAndNothingFloatsBetween) {
   // Zhu and Bridson's field alone is negative midway between particles up to four spacings apart.
-  for (const Real gap : {2.4, 2.8, 3.2, 3.6}) {
+  for (const Real gap : {2.6, 2.8, 3.2, 3.6}) {
     Cloud cloud;
     cloud.add(Vec3(0, 0, 0), 1);
     cloud.add(Vec3(gap, 0.2, 0.1), 1);
@@ -253,7 +261,8 @@ TEST(LevelSet, VolumeAboveGroundIsRightToAPercent) {
     }
   // A slab that lies on the ground.
   const Terrain flat = slope(0, 0);
-  const Cloud slab = fill(Box3(Vec3(-10, -10, 0), Vec3(10, 10, 3)), 0.5, [](const Vec3&) { return true; }, 0.05);
+  const Cloud slab = fill(
+      Box3(Vec3(-10, -10, 0), Vec3(10, 10, 3)), 0.5, [](const Vec3&) { return true; }, 0.05);
   const LevelSet lying = build_level_set(slab.points(), 1200, &flat, at_spacing(0.5));
   EXPECT_NEAR(volume_above_ground(lying, &flat) / 1200, 1, 0.01);
   Real area_above = 0;
@@ -289,7 +298,8 @@ TEST(LevelSet, DropsSmallPiecesAndFillsSmallBubblesWhenAsked) {
 }
 
 TEST(LevelSet, CarriesThePointsNumbersToTheVertices) {
-  const Cloud cloud = fill(cube(5), 0.5, [](const Vec3& p) { return p.norm() < 4.8; }, 0.02);
+  const Cloud cloud = fill(
+      cube(5), 0.5, [](const Vec3& p) { return p.norm() < 4.8; }, 0.02);
   const TriMesh mesh = mesh_level_set(build_level_set(cloud.points(), cloud.volume(), nullptr, at_spacing(0.5)));
   const auto& a = mesh.attributes;
   ASSERT_EQ(a.size(), 6u);
@@ -366,7 +376,8 @@ TEST(LevelSet, LowersTheGroundOnEveryKindOfTerrain) {
 TEST(LevelSet, ParticlesOverTheTerrainsRimGiveASolidMesh) {
   const Terrain ground = slope(0, 0);
   const Cloud cloud = fill(Box3(Vec3(34, -4, -3), Vec3(46, 4, 3)), 1, [](const Vec3& p) { return p.z() > 0 || p.x() > 40; });
-  const geometry::MeshReport report = geometry::validate(mesh_level_set(build_level_set(cloud.points(), cloud.volume(), &ground, at_spacing(1))));
+  const geometry::MeshReport report =
+      geometry::validate(mesh_level_set(build_level_set(cloud.points(), cloud.volume(), &ground, at_spacing(1))));
   EXPECT_TRUE(report.solid()) << geometry::to_string(report);
 }
 

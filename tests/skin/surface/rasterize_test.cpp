@@ -18,7 +18,8 @@ using testing_shapes::fill;
 
 Vec3 voxel_point(const Blocks& blocks, std::size_t b, std::size_t v) {
   const BlockCoord& c = blocks.coords()[b];
-  return Vec3(kSide * c[0] + static_cast<int>(v >> 6), kSide * c[1] + static_cast<int>((v >> 3) & 7), kSide * c[2] + static_cast<int>(v & 7));
+  return Vec3(kSide * c[0] + static_cast<int>(v >> 6), kSide * c[1] + static_cast<int>((v >> 3) & 7),
+              kSide * c[2] + static_cast<int>(v & 7));
 }
 
 TEST(Rasterize, AgreesWithTheSumOverAllParticlesInDouble) {
@@ -78,12 +79,14 @@ TEST(Blocks, PaddedBlocksAndSamplesAgreeWithSingleVoxels) {
 }
 
 TEST(ParticleGrid, AveragesAreThoseOfTheFormula) {
-  const Cloud cloud = fill(cube(3), 1, [](const Vec3&) { return true; }, 0.3);
+  const Cloud cloud = fill(
+      cube(3), 1, [](const Vec3&) { return true; }, 0.3);
   const ParticleGrid particles(cloud.points(), 0.5, 2);
   const int width = particles.carried().width;
   ASSERT_EQ(width, 12);
   std::vector<Vec3> points;
-  for (std::uint64_t i = 0; i < 100; ++i) points.push_back(14 * Vec3(random_uniform(8, 0, i) - 0.5, random_uniform(8, 1, i) - 0.5, random_uniform(8, 2, i) - 0.5));
+  for (std::uint64_t i = 0; i < 100; ++i)
+    points.push_back(14 * Vec3(random_uniform(8, 0, i) - 0.5, random_uniform(8, 1, i) - 0.5, random_uniform(8, 2, i) - 0.5));
   points.emplace_back(40, 0, 0);  // nothing within reach: a wider mean, of the near side mostly
   std::vector<float> out(points.size() * 12);
   particles.average(points, 4, out);
@@ -104,7 +107,8 @@ TEST(ParticleGrid, AveragesAreThoseOfTheFormula) {
 
 TEST(Smooth, FlattensBumpsAndLeavesPlanesAndLoneParticlesAlone) {
   const Box3 box(Vec3(0, 0, 0), Vec3(16, 16, 5));
-  const Cloud cloud = fill(box, 1, [](const Vec3&) { return true; }, 0.25);
+  const Cloud cloud = fill(
+      box, 1, [](const Vec3&) { return true; }, 0.25);
   const auto roughness = [&](int passes) {
     LevelSetOptions options;
     options.spacing = 1;
@@ -138,8 +142,7 @@ TEST(Distances, AreThoseOfTheSphere) {
   const Blocks blocks = blocks_around(particles, 4);
   Field phi(blocks.size() * kVoxels);
   // Twice the distance: only the zero level is to be trusted.
-  for (std::size_t i = 0; i < phi.size(); ++i)
-    phi[i] = static_cast<float>(2 * (voxel_point(blocks, i / kVoxels, i % kVoxels).norm() - 10));
+  for (std::size_t i = 0; i < phi.size(); ++i) phi[i] = static_cast<float>(2 * (voxel_point(blocks, i / kVoxels, i % kVoxels).norm() - 10));
   const Field distance = distances(blocks, 6, phi, 3);
   for (std::size_t i = 0; i < phi.size(); ++i) {
     const float wanted = std::clamp(phi[i] / 2, -3.0f, 3.0f);

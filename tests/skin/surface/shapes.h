@@ -52,7 +52,8 @@ struct Cloud {
 };
 
 /// Particles on a cubic lattice of the spacing, moved by up to jitter spacings in each direction, where inside(x).
-inline Cloud fill(const Box3& box, Real spacing, const std::function<bool(const Vec3&)>& inside, Real jitter = 0.1, std::uint64_t seed = 1) {
+inline Cloud fill(const Box3& box, Real spacing, const std::function<bool(const Vec3&)>& inside, Real jitter = 0.1,
+                  std::uint64_t seed = 1) {
   Cloud cloud;
   std::uint64_t n = 0;
   const Vec3 first = box.min() + Vec3::Constant(spacing / 2);

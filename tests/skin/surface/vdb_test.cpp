@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <openvdb/io/File.h>
 #include <openvdb/openvdb.h>
@@ -9,8 +10,6 @@
 #include <csignal>
 #include <cstdio>
 #include <fstream>
-
-#include <fmt/format.h>
 
 #include "geometry/base/error.h"
 #include "geometry/base/files.h"
@@ -28,7 +27,8 @@ using testing_shapes::fill;
 class Vdb : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::temp_directory_path() / fmt::format("effuse_vdb_test_{}_{}", ::getpid(), testing::UnitTest::GetInstance()->current_test_info()->name());
+    folder_ = fs::temp_directory_path() /
+              fmt::format("effuse_vdb_test_{}_{}", ::getpid(), testing::UnitTest::GetInstance()->current_test_info()->name());
     fs::create_directories(folder_);
   }
   void TearDown() override { fs::remove_all(folder_); }
@@ -64,7 +64,8 @@ TEST_F(Vdb, HoldsTheFourGridsWithTheirClasses) {
 TEST_F(Vdb, ValuesReadBackAreDistancesTemperaturesAndVelocities) {
   // A ball of radius 8 (16 voxels), far enough from the origin that single precision would show.
   const Vec3 centre(400000, 5900000, 300);
-  const Cloud ball_at_home = fill(cube(9), 1, [](const Vec3& p) { return p.norm() < 7.6; }, 0.05);
+  const Cloud ball_at_home = fill(
+      cube(9), 1, [](const Vec3& p) { return p.norm() < 7.6; }, 0.05);
   Cloud cloud;
   for (const Vec3& p : ball_at_home.x) {
     cloud.add(p + centre, 1);
@@ -97,7 +98,7 @@ TEST_F(Vdb, ValuesReadBackAreDistancesTemperaturesAndVelocities) {
     squares += error * error;
   }
   EXPECT_GT(n, 4 * kPi * 32 * 32 * 0.6);  // six voxels deep, radius 16: 19000
-  EXPECT_LT(worst, 0.6);                   // half a spacing: the particles' lattice is that rough
+  EXPECT_LT(worst, 0.6);                  // half a spacing: the particles' lattice is that rough
   EXPECT_LT(std::sqrt(squares / n), 0.2);
   // Deep inside and far outside: no voxel, the right sign.
   const openvdb::Coord middle = surface->transform().worldToIndexCellCentered(openvdb::Vec3d(centre.x(), centre.y(), centre.z()));
