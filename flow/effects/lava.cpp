@@ -93,15 +93,41 @@ class Lava final : public Effect {
 struct PlannedVent {
   Vent vent;
   Vec2 from, to;  // in the terrain file's coordinates
+  bool located = true;  // whether both could be read
   Place place;
 };
+
+/// The vents in the terrain's local frame, their centre lines on the ground; a fault for each end that is beside it.
+std::vector<Vent> place_vents(const std::vector<PlannedVent>& vents, const geometry::Terrain& terrain, std::vector<Fault>& faults) {
+  const Vec2 origin = terrain.georeference().origin.head<2>();
+  const Vec2 low = terrain.bounds().min().head<2>() + origin, high = terrain.bounds().max().head<2>() + origin;
+  std::vector<Vent> placed;
+  for (const PlannedVent& planned : vents) {
+    if (!planned.located) continue;
+    const auto ground = [&](const Vec2& map) {
+      const Vec2 local = map - origin;
+      const std::optional<Real> z = terrain.height(local.x(), local.y());
+      if (!z)
+        faults.push_back({planned.place, fmt::format("the vent at {:.12g}, {:.12g} is not on the terrain, which runs from {:.12g}, {:.12g} to {:.12g}, {:.12g}", map.x(), map.y(),
+                                                     low.x(), low.y(), high.x(), high.y())});
+      return Vec3(local.x(), local.y(), z.value_or(0));
+    };
+    Vent vent = planned.vent;
+    vent.from = ground(planned.from);
+    vent.to = planned.to == planned.from ? vent.from : ground(planned.to);
+    placed.push_back(vent);
+  }
+  return placed;
+}
 
 PlannedVent read_vent(Parameters& p) {
   PlannedVent planned;
   Vent& vent = planned.vent;
   const auto point = [&](const std::string& key, bool required, std::string_view what) {
     const std::vector<Real> xy = p.numbers(key, "m", 2, required, what);
-    return xy.size() == 2 ? Vec2(xy[0], xy[1]) : Vec2(0, 0);
+    if (xy.size() == 2) return Vec2(xy[0], xy[1]);
+    planned.located &= !required;
+    return Vec2(0, 0);
   };
   planned.place = p.place("at");
   if (p.has("from") || p.has("to")) {
@@ -194,32 +220,23 @@ EffectPlan read_lava(Parameters& p, Real duration) {
     p.fault("", fmt::format("the film covers {:.3g} s, {:.3g} steps, at most {:.0e}: look at film.time_scale, film.fps, max_step, courant, stiffness, viscosity and heat exchange", duration,
                             plan.estimate.steps, kMostSteps));
   }
+  plan.misfits = [vents](const World& world) {
+    std::vector<Fault> faults;
+    place_vents(vents, *world.terrain, faults);
+    return faults;
+  };
   plan.build = [o, vents](const World& world) -> std::unique_ptr<Effect> {
     ClassicOptions options = o;
     options.seed = world.seed;
     const geometry::Terrain& terrain = *world.terrain;
-    const Vec2 origin = terrain.georeference().origin.head<2>();
-    std::vector<Vent> placed;
     std::vector<Fault> faults;
-    for (const PlannedVent& planned : vents) {
-      Vent vent = planned.vent;
-      const auto ground = [&](const Vec2& map) {
-        const Vec2 local = map - origin;
-        const std::optional<Real> z = terrain.height(local.x(), local.y());
-        const Box3 box = terrain.bounds();
-        if (!z)
-          faults.push_back({planned.place, fmt::format("the vent at {:.12g}, {:.12g} is not on the terrain, which runs from {:.12g}, {:.12g} to {:.12g}, {:.12g}", map.x(), map.y(),
-                                                       box.min().x() + origin.x(), box.min().y() + origin.y(), box.max().x() + origin.x(), box.max().y() + origin.y())});
-        return Vec3(local.x(), local.y(), z.value_or(0));
-      };
-      vent.from = ground(planned.from);
-      vent.to = planned.to == planned.from ? vent.from : ground(planned.to);
+    std::vector<Vent> placed = place_vents(vents, terrain, faults);
+    for (std::size_t v = 0; v < placed.size() && faults.empty(); ++v) {
       std::size_t beside = 0;
-      const std::vector<Vec3> sites = vent.lattice(o.spacing);
+      const std::vector<Vec3> sites = placed[v].lattice(o.spacing);
       for (const Vec3& site : sites) beside += !terrain.height(site.x(), site.y());
-      if (beside > 0 && faults.empty())
-        faults.push_back({planned.place, fmt::format("{} of the vent's {} sites are not on the terrain: it reaches over the edge or a hole, wanted a narrower vent or one further in", beside, sites.size())});
-      placed.push_back(vent);
+      if (beside > 0)
+        faults.push_back({vents[v].place, fmt::format("{} of the vent's {} sites are not on the terrain: it reaches over the edge or a hole, wanted a narrower vent or one further in", beside, sites.size())});
     }
     if (!faults.empty()) throw InputError(faults);
     return std::make_unique<Lava>(options, std::move(placed), terrain);

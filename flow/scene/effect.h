@@ -59,6 +59,9 @@ class Effect {
 struct EffectPlan {
   std::string name;
   Estimate estimate;
+  /// What does not fit the world (a vent beside the terrain); may be asked of a plan whose table has faults.
+  std::function<std::vector<Fault>(const World&)> misfits;
+  /// Throws InputError with the misfits. Not to be asked of a plan whose table has faults.
   std::function<std::unique_ptr<Effect>(const World&)> build;
 };
 

@@ -478,6 +478,7 @@ StepReport ClassicLava::step(Real dt_max) {
     sort_particles();
   }
   Real dt = std::min(dt_max, stable_step());
+  if (dt_max - dt < 1e-6 * dt) dt = dt_max;  // no crumb of a step is left over
   if (dt < dt_max && dt < kSmallestStep * options_.rest_step())
     throw UnstableError(fmt::format("at t = {:.6g} s speed or acceleration leave a step of {:.3g} s only ({} particles)", time_, dt, size()));
 

@@ -47,10 +47,12 @@ std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const
   }
 
   const flow::Scene& scene = loaded->scene;
+  std::filesystem::path terrain_path;
   if (!scene.terrain_file.empty()) {
     try {
       std::filesystem::path path = scene.terrain_file;
       if (path.is_relative()) path = file.parent_path() / path;
+      terrain_path = std::filesystem::absolute(path).lexically_normal();
       importers::TerrainImport import = importers::import_terrain(path, {scene.ground_temperature, scene.terrain_crs});
       loaded->terrain = std::move(import.terrain);
       loaded->notes = std::move(import.notes);
@@ -59,9 +61,21 @@ std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const
       for (const Fault& fault : error.faults()) faults.push_back({scene.terrain_place, to_string(fault)});
     }
   }
+  if (!faults.empty() && loaded->terrain) {
+    for (const flow::EffectPlan& plan : scene.effects)
+      for (const Fault& fault : plan.misfits(flow::World{&*loaded->terrain, scene.seed})) faults.push_back(fault);
+  }
   if (faults.empty() && loaded->terrain) {
     loaded->simulation = std::make_unique<flow::Simulation>(scene, flow::World{&*loaded->terrain, scene.seed});
-    const flow::Node resolved = root.resolved();
+    flow::Node resolved = root.resolved();
+    // The resolved scene is written elsewhere: there, too, it must find its terrain.
+    for (auto& [name, table] : resolved.entries) {
+      if (name != "terrain") continue;
+      flow::Node path;
+      path.kind = flow::Node::Kind::kText;
+      path.text = terrain_path.string();
+      table.set("file", path);
+    }
     loaded->resolved = importers::to_toml(resolved);
     loaded->key = state_key(resolved, *loaded->terrain);
   }

@@ -191,6 +191,13 @@ TEST_F(ProgramTest, TellsOfAVentAtAPointAndAlongALineOnce) {
   EXPECT_EQ(count(outcome.err, "error: "), 1u) << outcome.err;
 }
 
+TEST_F(ProgramTest, TellsAVentBesideTheTerrainTogetherWithOtherFaults) {
+  const Outcome outcome = effuse({"check", kScenes / "lava.toml", "--set", "lava.vent[0].at=[500, 500]", "--set", "lava.spacing=2 kg"});
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_NE(outcome.err.find("not on the terrain"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("kg"), std::string::npos) << outcome.err;
+}
+
 TEST_F(ProgramTest, NamesTheNearestVerbAndRefusesAnUnknownFlag) {
   const Outcome verb = effuse({"chekc", "x.toml"});
   EXPECT_EQ(verb.code, 2);
@@ -295,7 +302,6 @@ TEST_F(ProgramTest, DescribesItsOwnFiles) {
   EXPECT_NE(outcome.out.find("surface"), std::string::npos) << outcome.out;
   EXPECT_EQ(effuse({"effects"}).code, 0);
   // The resolved scene is a scene: it checks, and says the same again.
-  fs::copy_file(kScenes / "gully.asc", out / "gully.asc");
   EXPECT_EQ(effuse({"check", out / "scene.toml"}).code, 0);
 }
 
