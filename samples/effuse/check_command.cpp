@@ -15,9 +15,9 @@ std::string bytes(double b) {
   return b < 1e9 ? fmt::format("{:.0f} MB", b / 1e6) : fmt::format("{:.1f} GB", b / 1e9);
 }
 
-/// Bytes a frame's files take: about 14 vertices of skin a particle and 120 bytes a vertex over the mesh formats.
+/// Bytes a frame's files take, as Maunga Whau's do: about ten vertices of skin a particle.
 double disk_per_frame(double particles, const skin::SkinSettings& s) {
-  return particles * (600.0 * s.ply + 1400.0 * s.obj + 900.0 * s.glb + 250.0 * s.vdb) + (s.preview ? 1.2 * s.picture.width * s.picture.height : 0);
+  return particles * (1150.0 * s.ply + 1650.0 * s.obj + 1150.0 * s.glb + 400.0 * s.vdb) + (s.preview ? 1.2 * s.picture.width * s.picture.height : 0);
 }
 }  // namespace
 
@@ -38,8 +38,8 @@ ExitCode check(const CheckCommand& command, const CommonOptions& common) {
     for (const flow::EffectPlan& plan : scene.effects) named |= plan.name == kind.name;
     if (!named) left_out += (left_out.empty() ? "" : ", ") + kind.name;
   }
-  // Skin and files of a frame, by the benchmark: 12 us a particle, and 0.6 us a pixel for the picture.
-  const double frame_s = 12e-6 * sum.particles / 2 + (loaded->skin.preview ? 6e-7 * loaded->skin.picture.width * loaded->skin.picture.height : 0);
+  // Skin and files of a frame, as Maunga Whau takes them: 80 us a particle, and 0.7 us a pixel for the picture.
+  const double frame_s = 80e-6 * sum.particles / 2 + (loaded->skin.preview ? 7e-7 * loaded->skin.picture.width * loaded->skin.picture.height : 0);
   const double seconds = sum.seconds + scene.frames * frame_s, disk = scene.frames * disk_per_frame(sum.particles / 2, loaded->skin);
 
   if (common.json) {
