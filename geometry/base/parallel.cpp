@@ -4,6 +4,9 @@
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 
+#include <exception>
+#include <mutex>
+
 #include "geometry/base/check.h"
 
 #if defined(__SANITIZE_THREAD__)
@@ -37,17 +40,32 @@ void parallel_chunks(std::size_t n, std::size_t grain, void (*body)(void*, std::
     for (std::size_t k = 0; k < chunks; ++k) body(context, k * grain, std::min((k + 1) * grain, n));
     return;
   }
+  // Of several exceptions the one of the first chunk is rethrown: the one that a single thread would meet.
+  std::mutex guard;
+  std::exception_ptr error;
+  std::size_t error_chunk = chunks;
   char started = 0, finished = 0;
   EFFUSE_TSAN_RELEASE(&started);
   tbb::parallel_for(
       tbb::blocked_range<std::size_t>(0, chunks, 1),
       [&](const tbb::blocked_range<std::size_t>& range) {
         EFFUSE_TSAN_ACQUIRE(&started);
-        for (std::size_t k = range.begin(); k != range.end(); ++k) body(context, k * grain, std::min((k + 1) * grain, n));
+        for (std::size_t k = range.begin(); k != range.end(); ++k) {
+          try {
+            body(context, k * grain, std::min((k + 1) * grain, n));
+          } catch (...) {
+            const std::lock_guard lock(guard);
+            if (k < error_chunk) {
+              error_chunk = k;
+              error = std::current_exception();
+            }
+          }
+        }
         EFFUSE_TSAN_RELEASE(&finished);
       },
       tbb::simple_partitioner());
   EFFUSE_TSAN_ACQUIRE(&finished);
+  if (error) std::rethrow_exception(error);
 }
 
 }  // namespace effuse

@@ -12,7 +12,7 @@
 ///
 /// A loop is cut into chunks whose size depends on its length and grain only, never on the threads.
 /// parallel_for: one writer per index. parallel_sum and parallel_max: a partial result per chunk,
-/// combined in the chunks' order. An exception of the body is rethrown in the caller.
+/// combined in the chunks' order. Of the body's exceptions that of the first chunk is rethrown in the caller.
 namespace effuse {
 
 /// At most n threads, the caller's included, until the scope ends (n >= 1). Limits OpenVDB too.

@@ -232,7 +232,7 @@ TEST(TextRule, FindsOwnPathsNotesAndLengthAndNothingElse) {
   EXPECT_EQ(count(std::string("cd /wo") + "rk/main"), 1u);
   EXPECT_EQ(count(std::string("/ro") + "ot/data"), 1u);
   EXPECT_EQ(count(std::string("// TO") + "DO later"), 1u);
-  EXPECT_EQ(count("path = dir / \"work/frames\";  // see flow/work/x.h, /usr/lib, http://example.org/home/x"), 0u);
+  EXPECT_EQ(count("path = dir / \"home/frames\";  // see flow/home/x.h, /usr/lib, http://example.org/home/x"), 0u);
   EXPECT_EQ(count(std::string(kMostLines - 1, '\n')), 0u);
   EXPECT_EQ(count(std::string(kMostLines, '\n')), 1u);
   EXPECT_EQ(text_faults("flow/a.h", "int x;").size(), 1u);

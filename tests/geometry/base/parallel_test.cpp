@@ -50,6 +50,18 @@ TEST(Parallel, AnExceptionReachesTheCaller) {
   }
 }
 
+TEST(Parallel, OfSeveralExceptionsTheFirstChunksArrives) {
+  for (const int threads : {1, 2, 4}) {
+    const ThreadLimit limit(threads);
+    try {
+      parallel_for(5000, [](std::size_t i) { if (i % 100 == 99) throw std::runtime_error(std::to_string(i)); }, 16);
+      FAIL() << "nothing was thrown";
+    } catch (const std::runtime_error& error) {
+      EXPECT_STREQ(error.what(), "99") << threads << " threads";
+    }
+  }
+}
+
 TEST(Parallel, MaxIsTheLargestOrTheLowest) {
   EXPECT_EQ(parallel_max(0, -5, [](std::size_t) { return 1.0; }), -5);
   EXPECT_EQ(parallel_max(5000, 0, [](std::size_t i) { return static_cast<Real>(i == 4000 ? 7 : 3); }), 7);
