@@ -2,244 +2,64 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
+#include <string>
 
-#include "flow/sph/classic_lava.h"
+#include "flow/effects/classic_lava_effect.h"
+#include "flow/effects/modern_lava_effect.h"
 #include "geometry/base/error.h"
-#include "geometry/base/zones.h"
 
 namespace effuse::flow {
 
 namespace {
 
-using sph::ClassicLava;
-using sph::ClassicOptions;
-using sph::Vent;
-
-template <std::size_t N>
-std::vector<std::string> names(const std::string_view (&list)[N]) {
-  return {std::begin(list), std::end(list)};
-}
-
-class Lava final : public Effect {
- public:
-  Lava(const ClassicOptions& options, std::vector<Vent> vents, const geometry::Terrain& terrain)
-      : lava_(options, std::move(vents),
-              {[terrain](std::span<const Vec3> x, Real reach, std::span<geometry::Contact> out) { terrain.contacts(x, reach, out); }},
-              [terrain](const Vec3& p) { return terrain.height(p.x(), p.y()).has_value(); }) {}
-
-  std::string_view name() const override { return "lava"; }
-  Real time() const override { return lava_.time(); }
-  void step(Real t_end) override {
-    last_ = lava_.step(t_end - lava_.time());
-    ++steps_;
-    retries_ += static_cast<std::size_t>(last_.retries);
-    smallest_step_ = std::min(smallest_step_, last_.dt);
-  }
-  geometry::Points points() const override { return lava_.points(); }
-  Real volume() const override { return lava_.volume(); }
-  Real spacing() const override { return lava_.options().spacing; }
-  std::size_t memory() const override { return lava_.memory(); }
-  void add_to(StateHash& hash) const override { lava_.add_to(hash); }
-  void save(StateWriter& out) const override {
-    lava_.save(out);
-    archive(*this, out);
-  }
-  void load(StateReader& in) override {
-    lava_.load(in);
-    archive(*this, in);
-  }
-
-  std::vector<std::pair<std::string, double>> figures() const override {
-    return {{"particles", static_cast<double>(lava_.size())},
-            {"volume_m3", lava_.volume()},
-            {"mass_emitted_kg", lava_.mass_emitted()},
-            {"mass_present_kg", static_cast<double>(lava_.size()) * lava_.particle_mass()},
-            {"mass_left_kg", lava_.mass_left()},
-            {"steps", static_cast<double>(steps_)},
-            {"smallest_step_s", steps_ > 0 ? smallest_step_ : 0},
-            {"retries", static_cast<double>(retries_)},
-            {"max_speed_m_s", last_.max_speed},
-            {"max_compression", last_.max_compression},
-            {"min_temperature_K", lava_.size() > 0 ? last_.min_temperature : 0},
-            {"max_temperature_K", last_.max_temperature}};
-  }
-  std::string status() const override {
-    return fmt::format("{} particles, {:.1f} m/s, {:.0f} degC, dt {:.1f} ms", lava_.size(), last_.max_speed, lava_.size() > 0 ? last_.min_temperature - kZeroCelsius : 0,
-                       1e3 * last_.dt);
-  }
-
- private:
-  /// What the figures say of the steps so far: a run resumed reports the whole.
-  template <class Self, class Archive>
-  static void archive(Self& self, Archive& io) {
-    io.value("steps", self.steps_);
-    io.value("retries", self.retries_);
-    io.value("smallest_step", self.smallest_step_);
-    io.value("max_speed", self.last_.max_speed);
-    io.value("max_compression", self.last_.max_compression);
-    io.value("min_temperature", self.last_.min_temperature);
-    io.value("max_temperature", self.last_.max_temperature);
-  }
-
-  ClassicLava lava_;
-  sph::StepReport last_;
-  std::size_t steps_ = 0, retries_ = 0;
-  Real smallest_step_ = 1e9;
-};
-
-/// A vent as the scene has it: map coordinates, the height left to the terrain.
-struct PlannedVent {
-  Vent vent;
-  Vec2 from, to;  // in the terrain file's coordinates
-  bool located = true;  // whether both could be read
-  Place place;
-};
-
-/// The vents in the terrain's local frame, their centre lines on the ground; a fault for each end that is beside it.
-std::vector<Vent> place_vents(const std::vector<PlannedVent>& vents, const geometry::Terrain& terrain, std::vector<Fault>& faults) {
-  const Vec2 origin = terrain.georeference().origin.head<2>();
-  const Vec2 low = terrain.bounds().min().head<2>() + origin, high = terrain.bounds().max().head<2>() + origin;
-  std::vector<Vent> placed;
-  for (const PlannedVent& planned : vents) {
-    if (!planned.located) continue;
-    const auto ground = [&](const Vec2& map) {
-      const Vec2 local = map - origin;
-      const std::optional<Real> z = terrain.height(local.x(), local.y());
-      if (!z)
-        faults.push_back({planned.place, fmt::format("the vent at {:.12g}, {:.12g} is not on the terrain, which runs from {:.12g}, {:.12g} to {:.12g}, {:.12g}", map.x(), map.y(),
-                                                     low.x(), low.y(), high.x(), high.y())});
-      return Vec3(local.x(), local.y(), z.value_or(0));
-    };
-    Vent vent = planned.vent;
-    vent.from = ground(planned.from);
-    vent.to = planned.to == planned.from ? vent.from : ground(planned.to);
-    placed.push_back(vent);
-  }
-  return placed;
-}
-
-PlannedVent read_vent(Parameters& p) {
-  PlannedVent planned;
-  Vent& vent = planned.vent;
-  const auto point = [&](const std::string& key, bool required, std::string_view what) {
-    const std::vector<Real> xy = p.numbers(key, "m", 2, required, what);
-    if (xy.size() == 2) return Vec2(xy[0], xy[1]);
-    planned.located &= !required;
-    return Vec2(0, 0);
-  };
-  planned.place = p.place("at");
-  if (p.has("from") || p.has("to")) {
-    planned.place = p.place("from");
-    planned.from = point("from", true, "one end of a fissure, in the terrain file's coordinates");
-    planned.to = point("to", true, "its other end");
-    point("at", false, "not with a fissure");
-    if (p.has("at")) p.fault("at", "found with 'from' and 'to', wanted one or the other: a crater vent is 'at' a point, a fissure runs 'from' one 'to' another");
-  } else {
-    planned.from = planned.to = point("at", true, "centre of a round vent, in the terrain file's coordinates");
-  }
-  vent.width = p.number("width", "m", std::nullopt, Parameters::positive(), "width of the fissure, or diameter of the round vent");
-  vent.rate = p.number("rate", "m3/s", std::nullopt, Parameters::not_negative(), "volume let out a second");
-  vent.temperature = p.number("temperature", "K", 1473.15, {500, 2500}, "of the lava that comes out");
-  vent.start = p.number("start", "s", 0, Parameters::not_negative(), "when it opens (simulated time)");
-  vent.stop = p.number("stop", "s", 1e9, Parameters::positive(), "when it closes");
-  vent.ramp = p.number("ramp", "s", 0, Parameters::not_negative(), "time over which the rate grows after start and falls before stop");
-  if (vent.stop <= vent.start) p.fault("stop", fmt::format("the vent closes at {} s, before it opens at {} s", vent.stop, vent.start));
-  return planned;
-}
-
 // Beyond these a number in the scene is a slip, and the run would never end.
 constexpr Real kMostParticles = 1e9, kMostSites = 1e6, kMostSteps = 1e9;
 
-Estimate estimate(const ClassicOptions& o, const std::vector<PlannedVent>& vents, Real duration) {
-  Estimate e;
-  for (const PlannedVent& v : vents) e.particles += v.vent.volume(duration) / std::pow(o.spacing, 3);
-  e.steps = 1.15 * duration / o.rest_step();  // lava that moves takes shorter ones
-  e.bytes = 720 * e.particles;
-  // 0.5 us a particle, step and evaluation on two cores (the benchmark's figure); on average half the particles are there.
-  e.seconds = e.steps * e.particles / 2 * 0.5e-6 * evaluations(o.scheme) + e.steps * 5e-5;
-  return e;
+/// A scene of the other model is told so, once; its parameters are unknown here.
+void tell_of_the_other_model(Parameters& p, bool modern) {
+  static constexpr const char* kClassic[] = {"viscosity", "stiffness", "air_exchange", "ground_exchange", "air_temperature", "ground_friction", "heat_capacity", "diffusivity", "cohesion"};
+  static constexpr const char* kModern[] = {"preset", "rheology", "heat", "crust_viscosity", "slip_length"};
+  const auto tell = [&](const auto& keys, const char* other) {
+    for (const char* key : keys) {
+      if (!p.has(key)) continue;
+      p.fault(key, fmt::format("is of the {0} model; this lava's model is {1}: model = \"{0}\" would do", other, modern ? "modern" : "classic"));
+      return;
+    }
+  };
+  if (modern) tell(kClassic, "classic");
+  else tell(kModern, "modern");
 }
 
 }  // namespace
 
 EffectPlan read_lava(Parameters& p, Real duration) {
-  ClassicOptions o;
-  const auto positive = Parameters::positive(), not_negative = Parameters::not_negative();
-  const Parameters::Range temperature = {0, 5000, true};
-  p.choice("model", {"classic"}, 0, "the equations: classic is Stora et al. 1999");
-  o.spacing = p.number("spacing", "m", std::nullopt, positive, "between particles at rest: the resolution");
-  o.support = p.number("support", "", o.support, {1.5, 4}, "radius of the kernel, in spacings");
-  o.kernel = static_cast<sph::KernelKind>(p.choice("kernel", names(sph::kKernelNames), 0, "smoothing kernel"));
-  o.density = p.number("density", "kg/m3", o.density, positive, "at rest");
-  o.stiffness = p.number("stiffness", "m2/s2", o.stiffness, positive, "k in P = k (rho - rho0): speed of sound squared; stiffer is less compressible and slower");
-  o.cohesion = p.number("cohesion", "", o.cohesion, {0, 1}, "of negative pressure: 1 as the state equation says");
-  o.density_diffusion = p.number("density_diffusion", "", o.density_diffusion, {0, 0.5}, "smooths the noise of the continuity equation; 0 is the paper's");
-  o.density_relaxation = p.number("density_relaxation", "", o.density_relaxation, {0, 1}, "pull of the density to the one summed over neighbours; 0 is the paper's");
-  Parameters viscosity = p.table("viscosity", "kinematic, nu(T) = b exp(-a T) through two points");
-  auto& law = o.viscosity;
-  law.hot_nu = viscosity.number("hot", "m2/s", law.hot_nu, positive, "at hot_temperature");
-  law.hot_temperature = viscosity.number("hot_temperature", "K", law.hot_temperature, temperature, "");
-  law.cold_nu = viscosity.number("cold", "m2/s", law.cold_nu, positive, "at cold_temperature");
-  law.cold_temperature = viscosity.number("cold_temperature", "K", law.cold_temperature, temperature, "");
-  law.max = viscosity.number("max", "m2/s", law.max, positive, "never above: the explicit step pays for it");
-  if (law.cold_temperature >= law.hot_temperature) viscosity.fault("cold_temperature", "is not below hot_temperature");
-  if (law.cold_nu < law.hot_nu) viscosity.fault("cold", "is below hot: lava thickens as it cools");
-  o.ground_friction = p.number("ground_friction", "", o.ground_friction, {0, 1}, "1 no slip, 0 free slip");
-  o.diffusivity = p.number("diffusivity", "m2/s", o.diffusivity, not_negative, "of heat inside");
-  o.heat_capacity = p.number("heat_capacity", "J/(kg K)", o.heat_capacity, positive, "");
-  o.air_exchange = p.number("air_exchange", "W/(m2 K)", o.air_exchange, not_negative, "heat transfer to the air");
-  o.air_temperature = p.number("air_temperature", "K", o.air_temperature, temperature, "");
-  o.ground_exchange = p.number("ground_exchange", "W/(m2 K)", o.ground_exchange, not_negative, "heat transfer to the ground");
-  o.scheme = static_cast<Scheme>(p.choice("scheme", names(kSchemeNames), 1, "time integration"));
-  o.courant = p.number("courant", "", o.courant, {0, 2, true}, "of the step: share of the time sound takes over half the support");
-  o.max_step = p.number("max_step", "s", o.max_step, positive, "no step is longer");
-  o.surface.mass_quotient = p.number("surface_mass_quotient", "", o.surface.mass_quotient, {0, 1}, "on the surface below this share of mass in the outer half-space");
-  o.surface.coplanarity = p.number("surface_coplanarity", "", o.surface.coplanarity, {0, 1}, "on the surface when the neighbours are this flat");
-  o.rest_period = p.number("rest_period", "s", o.rest_period, not_negative, "material coordinates are renewed this often; 0: never");
-  if (o.rest_period > 0 && o.rest_period < 1e-3) p.fault("rest_period", "must be 0 s, or at least 0.001 s");
-
-  std::vector<PlannedVent> vents;
-  for (Parameters& vent : p.tables("vent", "where lava comes out; at least one")) vents.push_back(read_vent(vent));
-  if (vents.empty()) p.fault("vent", "lava has no vent, wanted at least one table [[lava.vent]]");
+  const bool modern = p.choice("model", {"modern", "classic"}, 0,
+                               "the equations: modern has implicit pressure and viscosity, real rheology, heat and crust; classic is Stora et al. 1999") == 0;
+  const LavaModel model = modern ? read_modern_lava(p) : read_classic_lava(p);
+  tell_of_the_other_model(p, modern);
+  const std::vector<PlannedVent> vents = read_vents(p, model.vent_temperature);
 
   EffectPlan plan;
   plan.name = "lava";
-  plan.estimate = estimate(o, vents, duration);
-  Real widest = 0;  // of the vents, in sites
-  for (const PlannedVent& v : vents) widest = std::max(widest, (std::max((v.to - v.from).norm(), v.vent.width) / o.spacing + 1) * (v.vent.width / o.spacing + 1));
-  // Negated: what is not a number is too many as well.
-  if (o.spacing <= 0) {
-    // Told already: without a spacing there is nothing to count.
-  } else if (!(plan.estimate.particles <= kMostParticles)) {
-    p.fault("spacing", fmt::format("the vents' rates would make {:.3g} particles of this size, at most {:.0e}: a larger spacing or a smaller rate would do", plan.estimate.particles, kMostParticles));
-  } else if (!(widest <= kMostSites)) {
-    p.fault("spacing", fmt::format("the widest vent would have {:.3g} particles side by side, at most {:.0e}: a larger spacing or a narrower vent would do", widest, kMostSites));
-  } else if (!(plan.estimate.steps <= kMostSteps)) {
-    p.fault("", fmt::format("the film covers {:.3g} s, {:.3g} steps, at most {:.0e}: look at film.time_scale, film.fps, max_step, courant, stiffness, viscosity and heat exchange", duration,
-                            plan.estimate.steps, kMostSteps));
+  if (model.spacing > 0) {  // without one there is nothing to count; that is told already
+    plan.estimate = model.estimate(vents, duration);
+    const Real widest = most_sites(vents, model.spacing);
+    // Negated: what is not a number is too many as well.
+    if (!(plan.estimate.particles <= kMostParticles)) {
+      p.fault("spacing", fmt::format("the vents' rates would make {:.3g} particles of this size, at most {:.0e}: a larger spacing or a smaller rate would do", plan.estimate.particles, kMostParticles));
+    } else if (!(widest <= kMostSites)) {
+      p.fault("spacing", fmt::format("the widest vent would have {:.3g} particles side by side, at most {:.0e}: a larger spacing or a narrower vent would do", widest, kMostSites));
+    } else if (!(plan.estimate.steps <= kMostSteps)) {
+      p.fault("", fmt::format("the film covers {:.3g} s, {:.3g} steps, at most {:.0e}: look at film.time_scale, film.fps, {}", duration, plan.estimate.steps, kMostSteps, model.sets_the_step));
+    }
   }
   plan.misfits = [vents](const World& world) {
     std::vector<Fault> faults;
     place_vents(vents, *world.terrain, faults);
     return faults;
   };
-  plan.build = [o, vents](const World& world) -> std::unique_ptr<Effect> {
-    ClassicOptions options = o;
-    options.seed = world.seed;
-    const geometry::Terrain& terrain = *world.terrain;
-    std::vector<Fault> faults;
-    std::vector<Vent> placed = place_vents(vents, terrain, faults);
-    for (std::size_t v = 0; v < placed.size() && faults.empty(); ++v) {
-      std::size_t beside = 0;
-      const std::vector<Vec3> sites = placed[v].lattice(o.spacing);
-      for (const Vec3& site : sites) beside += !terrain.height(site.x(), site.y());
-      if (beside > 0)
-        faults.push_back({vents[v].place, fmt::format("{} of the vent's {} sites are not on the terrain: it reaches over the edge or a hole, wanted a narrower vent or one further in", beside, sites.size())});
-    }
-    if (!faults.empty()) throw InputError(faults);
-    return std::make_unique<Lava>(options, std::move(placed), terrain);
+  plan.build = [make = model.make, spacing = model.spacing, vents](const World& world) {
+    return make(place_whole_vents(vents, *world.terrain, spacing), *world.terrain, world.seed);
   };
   return plan;
 }

@@ -9,13 +9,11 @@
 #include "geometry/base/check.h"
 #include "geometry/base/error.h"
 #include "geometry/base/parallel.h"
-#include "geometry/base/random.h"
 #include "geometry/base/zones.h"
 
 namespace effuse::flow::sph {
 
 namespace {
-constexpr Index kNone = ~Index{0};
 constexpr int kSortInterval = 16;    // steps between two orderings of the particles in memory, and looks for what left
 constexpr int kMaxRetries = 8;
 constexpr Real kSmallestStep = 1e-6; // of the step at rest
@@ -23,7 +21,6 @@ constexpr Real kTorn = 0.9;          // of the rest density: no density falls be
 constexpr Real kScatter = 0.15;      // of the rest density: summed over 26 disordered neighbours instead of a lattice's
 constexpr Real kClearance = 0.25;    // a particle stays this many spacings off the ground
 constexpr std::string_view kModel = "classic 1";  // of a checkpoint: changes with what is saved
-constexpr std::uint64_t kPhaseStream = 1;  // random numbers: when a vent's sites start
 
 /// Calls f with the kernel that kind names.
 template <class F>
@@ -37,27 +34,6 @@ auto with_kernel(KernelKind kind, Real support, F&& f) {
 
 /// Thrown by a stage of a scheme that is not fit to ask for rates: the step is given up.
 struct BadStage {};
-
-/// An archive (ClassicLava::archive) that hashes.
-struct HashArchive {
-  StateHash& hash;
-  template <class T>
-  void array(std::string_view, const std::vector<T>& values) {
-    hash.add(std::span<const T>(values));
-  }
-  template <class T>
-  void value(std::string_view, T v) {
-    hash.add(v);
-  }
-};
-
-/// values[k] = values[which[k]]
-template <class T>
-void gather(std::vector<T>& values, const std::vector<Index>& which) {
-  std::vector<T> out(which.size());
-  parallel_for(which.size(), [&](std::size_t k) { out[k] = values[which[k]]; }, 4096);
-  values.swap(out);
-}
 }  // namespace
 
 Real ExponentialViscosity::a() const { return std::log(cold_nu / hot_nu) / (hot_temperature - cold_temperature); }
@@ -101,14 +77,14 @@ struct ClassicLava::System {
 
 ClassicLava::ClassicLava(const ClassicOptions& options, std::vector<Vent> vents, std::vector<ContactSource> ground, std::function<bool(const Vec3&)> inside)
     : options_(options),
-      vents_(std::move(vents)),
-      ground_(std::move(ground)),
-      inside_(std::move(inside)),
       mass_(options.density * std::pow(options.spacing, 3)),
       support_(options.support * options.spacing),
       half_space_(with_kernel(options.kernel, support_, [](const auto& kernel) { return HalfSpaceTable(kernel); })),
       density_kernel_(support_),
-      density_half_space_(density_kernel_) {
+      density_half_space_(density_kernel_),
+      ground_({support_, support_, kClearance * options.spacing, 1}, std::move(ground), std::move(inside)),
+      emitter_(std::move(vents), options.spacing, options.seed, ground_.sources()),
+      frames_(options.rest_period) {
   CHECK_GT(options.spacing, 0.0);
   CHECK_GE(options.support, 1.5);
   CHECK_GT(options.density, 0.0);
@@ -117,41 +93,6 @@ ClassicLava::ClassicLava(const ClassicOptions& options, std::vector<Vent> vents,
   CHECK_GT(options.courant, 0.0);
   CHECK_GT(options.max_step, 0.0);
   CHECK_GE(options.surface_interval, 1);
-  for (const Vent& vent : vents_) CHECK(std::isfinite(vent.rate) && vent.rate >= 0);
-  place_sites();
-  rest2_born_ = -options_.rest_period / 2;
-}
-
-void ClassicLava::place_sites() {
-  for (std::size_t v = 0; v < vents_.size(); ++v) {
-    const std::vector<Vec3> lattice = vents_[v].lattice(options_.spacing);
-    for (Vec3 at : lattice) {
-      // Down (or up) onto the ground by Newton's method on the signed distance along the vertical.
-      Vec3 up = Vec3::UnitZ();
-      const Real start = at.z();
-      Real off = 0;
-      for (int iteration = 0; iteration < 20; ++iteration) {
-        geometry::Contact nearest;
-        for (const ContactSource& source : ground_) {
-          geometry::Contact contact;
-          source({&at, 1}, std::numeric_limits<Real>::infinity(), {&contact, 1});
-          if (contact.distance < nearest.distance) nearest = contact;
-        }
-        if (!nearest.any()) break;
-        up = nearest.normal;
-        off = std::abs(nearest.distance);
-        at.z() -= nearest.distance / std::max(up.z(), 0.2);
-        if (std::abs(nearest.distance) < 1e-6 * options_.spacing) break;
-      }
-      // Over a rim or beside a wall of a mesh it runs away: then the height of the vent has to do.
-      if (!(off <= options_.spacing)) {
-        at.z() = start;
-        up = Vec3::UnitZ();
-      }
-      const Real phase = random_uniform(options_.seed, kPhaseStream, sites_.size());
-      sites_.push_back({at, up, static_cast<Index>(v), static_cast<Real>(lattice.size()) * std::pow(options_.spacing, 3), phase});
-    }
-  }
 }
 
 void ClassicLava::born(const Vec3& x, const Vec3& v, Real temperature) {
@@ -159,16 +100,10 @@ void ClassicLava::born(const Vec3& x, const Vec3& v, Real temperature) {
   y_.v.push_back(v);
   y_.rho.push_back(options_.density);
   y_.T.push_back(temperature);
-  id_.push_back(next_id_++);
-  birth_.push_back(time_);
-  site_.push_back(kFree);
-  number_.push_back(0);
-  rest_.push_back(x);
-  rest2_.push_back(x);
+  census_.born(time_);
   surface_.push_back(1);
   outward_.push_back(Vec3::Zero());
-  ground_bound_.push_back(-std::numeric_limits<Real>::infinity());
-  ++emitted_;
+  ground_.born();
 }
 
 void ClassicLava::add(std::span<const Vec3> x, std::span<const Vec3> v, std::span<const Real> temperature) {
@@ -177,91 +112,44 @@ void ClassicLava::add(std::span<const Vec3> x, std::span<const Vec3> v, std::spa
   for (std::size_t i = 0; i < x.size(); ++i) {
     CHECK(x[i].allFinite() && v[i].allFinite() && std::isfinite(temperature[i]));
     born(x[i], v[i], temperature[i]);
+    emitter_.add_free();
+    frames_.born(x[i], x[i]);
   }
 }
 
 std::size_t ClassicLava::emit(Real t0, Real t1) {
-  const std::size_t before = size();
-  const Real dx = options_.spacing;
-  for (std::size_t s = 0; s < sites_.size(); ++s) {
-    const Site& site = sites_[s];
-    const Vent& vent = vents_[site.vent];
-    const Real risen0 = vent.volume(t0) / site.share + site.phase, risen1 = vent.volume(t1) / site.share + site.phase;
-    for (Real k = std::floor(risen0) + 1; k <= std::floor(risen1); k += 1) {
-      born(site.at + site.up * ((risen1 - k) * dx), site.up * ((risen1 - risen0) * dx / (t1 - t0)), vent.temperature);
-      site_.back() = static_cast<Index>(s);
-      number_.back() = k;
-      // What comes out of a vent was, when the material coordinates were born, that far down the conduit.
-      rest_.back() -= site.up * ((risen1 - site.phase - vent.volume(rest_born_) / site.share) * dx);
-      rest2_.back() -= site.up * ((risen1 - site.phase - vent.volume(rest2_born_) / site.share) * dx);
-    }
+  const std::span<const Emitter::Newborn> newborn = emitter_.emit(t0, t1);
+  for (const Emitter::Newborn& p : newborn) {
+    born(p.x, p.v, p.temperature);
+    // What comes out of a vent was, when the material coordinates were born, that far down the conduit.
+    frames_.born(p.x - emitter_.rise(p.site, frames_.rest_born(), t1), p.x - emitter_.rise(p.site, frames_.rest2_born(), t1));
   }
-  return size() - before;
+  return newborn.size();
 }
 
-void ClassicLava::carry(Real dt) {
-  for (std::size_t i = 0; i < size(); ++i) {
-    if (site_[i] == kFree) continue;
-    const Site& site = sites_[site_[i]];
-    const Vent& vent = vents_[site.vent];
-    const Real volume = vent.volume(time_);
-    if (time_ >= vent.stop || volume / site.share + site.phase - number_[i] >= 1) {
-      site_[i] = kFree;
-    } else {
-      y_.v[i] = site.up * ((vent.volume(time_ + dt) - volume) / site.share * options_.spacing / dt);
-    }
-  }
-}
-
-void ClassicLava::keep(const std::vector<Index>& which) {
+void ClassicLava::keep(std::span<const Index> which) {
   gather(y_.x, which);
   gather(y_.v, which);
   gather(y_.rho, which);
   gather(y_.T, which);
-  gather(id_, which);
-  gather(birth_, which);
-  gather(site_, which);
-  gather(number_, which);
-  gather(rest_, which);
-  gather(rest2_, which);
+  census_.keep(which);
+  emitter_.keep(which);
+  frames_.keep(which);
   gather(surface_, which);
   gather(outward_, which);
-  gather(ground_bound_, which);
+  ground_.keep(which);
 }
 
 void ClassicLava::sort_particles() {
   ZONE("sph.sort");
   grid_.build(y_.x, support_);
-  keep({grid_.order().begin(), grid_.order().end()});
+  keep(grid_.order());
 }
 
 void ClassicLava::find_neighbors(std::span<const Vec3> x) {
   grid_.build(x, support_);
   neighbors_.find(grid_, support_);
   neighbors_of_ = x.data();
-}
-
-void ClassicLava::find_contacts() {
-  ZONE("sph.contacts");
-  contact_of_.clear();
-  query_.clear();
-  contact_index_.assign(size(), kNone);
-  for (std::size_t i = 0; i < size(); ++i) {
-    if (!surface_[i] && ground_bound_[i] > support_) continue;
-    contact_index_[i] = static_cast<Index>(contact_of_.size());
-    contact_of_.push_back(static_cast<Index>(i));
-    query_.push_back(y_.x[i]);
-  }
-  const std::size_t n = query_.size();
-  contacts_.resize(n * ground_.size());
-  for (std::size_t s = 0; s < ground_.size(); ++s) ground_[s](query_, support_, std::span(contacts_).subspan(s * n, n));
-  parallel_for(n, [&](std::size_t q) {
-    // Nothing within reach: at least the reach away.
-    Real bound = support_;
-    for (std::size_t s = 0; s < ground_.size(); ++s) bound = std::min(bound, contacts_[s * n + q].distance);
-    ground_bound_[contact_of_[q]] = bound;
-  }, 4096);
-  COUNT("sph.contact queries", n * ground_.size());
 }
 
 void ClassicLava::compute_rates(const LavaState& y, LavaState& k, bool velocities, bool positions) {
@@ -330,13 +218,10 @@ void ClassicLava::accumulate(const Kernel& kernel, const LavaState& y, LavaState
 
     Vec3 ground_normal = Vec3::Zero();  // of ground that it lies on
     const Real r2_over_rho = kVelocities && surface_[i] ? std::pow(m / a.rho, 2.0 / 3.0) / a.rho : 0;  // 0: exchanges nothing
-    if (contact_index_[i] != kNone && site_[i] == kFree) {  // under a vent there is no floor
-      for (std::size_t s = 0; s < ground_.size(); ++s) {
-        const geometry::Contact& c = contacts_[s * contact_of_.size() + contact_index_[i]];
-        if (!c.any()) continue;
+    const bool held = emitter_.held(i);
+    if (!held) {  // under a vent there is no floor
+      ground_.for_each_contact(i, a.x, [&](const geometry::Contact& c, Real d) {
         const Vec3& normal = c.normal;
-        const Real d = c.distance + normal.dot(a.x - query_[contact_index_[i]]);
-        if (d >= support_) continue;
         const Real area = half_space_.slope(d);  // < 0
         const Vec3 dv = c.surface_velocity - a.v;
         acceleration -= 2 * rho0 * std::max(a.p_over_rho2, 0.0) * area * normal;
@@ -348,7 +233,7 @@ void ClassicLava::accumulate(const Kernel& kernel, const LavaState& y, LavaState
           const Real T_ground = c.surface_temperature > 0 ? c.surface_temperature : options_.ground_temperature;
           dT -= options_.ground_exchange * exchange * r2_over_rho * (a.T - T_ground);
         }
-      }
+      });
     }
     if (surface_[i]) {
       // To the air goes what does not lie on the ground; a sheet one particle thick has both sides.
@@ -362,7 +247,6 @@ void ClassicLava::accumulate(const Kernel& kernel, const LavaState& y, LavaState
     // Lava tears rather than thins.
     if (a.rho < kTorn * rho0) drho = std::max(drho, 0.0);
 
-    const bool held = site_[i] != kFree;
     if constexpr (kPositions) {
       k.x[i] = a.v;
       k.rho[i] = drho;
@@ -377,7 +261,7 @@ void ClassicLava::accumulate(const Kernel& kernel, const LavaState& y, LavaState
 const LavaState& ClassicLava::rates() {
   find_neighbors(y_.x);
   find_surface(y_.x, neighbors_, support_, options_.surface, surface_, outward_);
-  find_contacts();
+  ground_.find(y_.x);
   compute_rates(y_, storage_.k1, true, true);
   return storage_.k1;
 }
@@ -411,61 +295,13 @@ bool ClassicLava::acceptable(const LavaState& y) const {
   return worst == 0;
 }
 
-void ClassicLava::push_out_of_ground() {
-  ZONE("sph.contacts");
-  const Real clearance = kClearance * options_.spacing;
-  std::vector<Index> suspects;
-  for (std::size_t i = 0; i < size(); ++i) {
-    ground_bound_[i] -= (y_.x[i] - before_.x[i]).norm();
-    if (ground_bound_[i] < clearance && site_[i] == kFree) suspects.push_back(static_cast<Index>(i));
-  }
-  COUNT("sph.contact queries", suspects.size() * ground_.size());
-
-  std::vector<Vec3> at(suspects.size());
-  std::vector<geometry::Contact> contact(suspects.size());
-  for (std::size_t q = 0; q < suspects.size(); ++q) ground_bound_[suspects[q]] = support_;
-  for (const ContactSource& source : ground_) {
-    for (std::size_t q = 0; q < suspects.size(); ++q) at[q] = y_.x[suspects[q]];
-    source(at, support_, contact);
-    for (std::size_t q = 0; q < suspects.size(); ++q) {
-      const geometry::Contact& c = contact[q];
-      if (!c.any()) continue;
-      const Index i = suspects[q];
-      ground_bound_[i] = std::min(ground_bound_[i], c.distance);
-      if (c.distance >= clearance) continue;
-      y_.x[i] += (clearance - c.distance) * c.normal;
-      const Real into = (y_.v[i] - c.surface_velocity).dot(c.normal);
-      if (into < 0) y_.v[i] -= into * c.normal;
-      ground_bound_[i] = clearance;
-    }
-  }
-}
-
 std::size_t ClassicLava::drop_what_left() {
-  if (!inside_) return 0;
-  // Who lies on the ground has not left it, nor who is in the midst of others.
-  std::vector<std::uint8_t> left(size());
-  parallel_for(size(), [&](std::size_t i) { left[i] = surface_[i] && ground_bound_[i] > options_.spacing && !inside_(y_.x[i]); }, 4096);
-  std::vector<Index> stay;
-  for (std::size_t i = 0; i < size(); ++i)
-    if (!left[i]) stay.push_back(static_cast<Index>(i));
+  if (!ground_.has_edge()) return 0;
+  const std::vector<Index> stay = ground_.who_stays(y_.x, surface_, options_.spacing);
   const std::size_t gone = size() - stay.size();
   if (gone > 0) keep(stay);
-  left_ += gone;
+  census_.count_left(gone);
   return gone;
-}
-
-void ClassicLava::renew_rest() {
-  const Real period = options_.rest_period;
-  if (period <= 0) return;
-  if (time_ - rest_born_ >= period) {
-    rest_ = y_.x;
-    rest_born_ += period * std::floor((time_ - rest_born_) / period);
-  }
-  if (time_ - rest2_born_ >= period) {
-    rest2_ = y_.x;
-    rest2_born_ += period * std::floor((time_ - rest2_born_) / period);
-  }
 }
 
 StepReport ClassicLava::step(Real dt_max) {
@@ -486,8 +322,8 @@ StepReport ClassicLava::step(Real dt_max) {
     find_neighbors(y_.x);
     find_surface(y_.x, neighbors_, support_, options_.surface, surface_, outward_);
   }
-  find_contacts();
-  carry(dt);
+  ground_.find(y_.x);
+  emitter_.carry(time_, dt, y_.v);
   before_ = y_;
   for (;; ++report.retries, dt /= 2) {
     if (try_step(dt)) break;
@@ -500,9 +336,10 @@ StepReport ClassicLava::step(Real dt_max) {
   max_acceleration_ = std::sqrt(parallel_max(size(), 0, [&](std::size_t i) { return ((y_.v[i] - before_.v[i]) / dt).squaredNorm(); }));
   time_ += dt;
   ++steps_;
-  push_out_of_ground();
+  ground_.moved(before_.x, y_.x);
+  ground_.project(y_.x, y_.v, [&](std::size_t i) { return !emitter_.held(i); });
   report.emitted = emit(time_ - dt, time_);
-  renew_rest();
+  frames_.renew(time_, y_.x);
 
   report.dt = dt;
   report.neighbor_pairs = neighbors_.pairs();
@@ -522,7 +359,7 @@ geometry::Points ClassicLava::points() const {
   const ExponentialViscosity& law = options_.viscosity;
   for (std::size_t i = 0; i < n; ++i) {
     crust_[i] = std::clamp((law.hot_temperature - y_.T[i]) / (law.hot_temperature - law.cold_temperature), 0.0, 1.0);
-    age_[i] = time_ - birth_[i];
+    age_[i] = time_ - census_.births()[i];
   }
   geometry::Points points;
   points.position = y_.x;
@@ -531,21 +368,20 @@ geometry::Points ClassicLava::points() const {
   points.temperature = y_.T;
   points.crust = crust_;
   points.age = age_;
-  points.id = id_;
+  points.id = census_.ids();
   points.surface = surface_;
-  points.rest = rest_;
-  points.rest2 = rest2_;
-  // Each set weighs nothing at its birth and just before its next one.
-  if (options_.rest_period > 0) points.rest_ratio = std::abs(2 * (time_ - rest_born_) / options_.rest_period - 1);
+  points.rest = frames_.rest();
+  points.rest2 = frames_.rest2();
+  points.rest_ratio = frames_.ratio(time_);
   return points;
 }
 
 std::size_t ClassicLava::memory() const {
   const auto bytes = [](const auto&... vectors) { return ((vectors.capacity() * sizeof(vectors[0])) + ...); };
   const auto of_state = [&](const LavaState& y) { return bytes(y.x, y.v, y.rho, y.T); };
-  return of_state(y_) + bytes(id_, birth_, site_, number_, rest_, rest2_, surface_, outward_, ground_bound_) + of_state(before_) + of_state(storage_.stage) +
-         of_state(storage_.k1) + of_state(storage_.k2) + of_state(storage_.k3) + of_state(storage_.k4) + bytes(packed_, contacts_, contact_of_, contact_index_, query_) +
-         bytes(radius_, crust_, age_, sites_) + grid_.memory() + neighbors_.memory();
+  return of_state(y_) + of_state(before_) + of_state(storage_.stage) + of_state(storage_.k1) + of_state(storage_.k2) + of_state(storage_.k3) + of_state(storage_.k4) +
+         bytes(surface_, outward_, packed_, radius_, crust_, age_) + census_.memory() + emitter_.memory() + frames_.memory() + ground_.memory() + grid_.memory() +
+         neighbors_.memory();
 }
 
 template <class Self, class Archive>
@@ -554,21 +390,15 @@ void ClassicLava::archive(Self& self, Archive& io) {
   io.array("v", self.y_.v);
   io.array("rho", self.y_.rho);
   io.array("T", self.y_.T);
-  io.array("id", self.id_);
-  io.array("birth", self.birth_);
-  io.array("site", self.site_);
-  io.array("number", self.number_);
-  io.array("rest", self.rest_);
-  io.array("rest2", self.rest2_);
+  Census::arrays(self.census_, io);
+  Emitter::arrays(self.emitter_, io);
+  MaterialFrames::arrays(self.frames_, io);
   io.array("surface", self.surface_);
   io.array("outward", self.outward_);
-  io.array("ground_bound", self.ground_bound_);
+  Ground::arrays(self.ground_, io);
   io.value("time", self.time_);
-  io.value("rest_born", self.rest_born_);
-  io.value("rest2_born", self.rest2_born_);
-  io.value("next_id", self.next_id_);
-  io.value("emitted", self.emitted_);
-  io.value("left", self.left_);
+  MaterialFrames::values(self.frames_, io);
+  Census::values(self.census_, io);
   io.value("steps", self.steps_);
   io.value("max_acceleration", self.max_acceleration_);
 }
@@ -589,11 +419,11 @@ void ClassicLava::load(StateReader& in) {
   if (model != kModel) throw InputError(Place{}, fmt::format("the checkpoint holds a '{:.40}' lava, wanted '{}'", model, kModel));
   archive(*this, in);
   const std::size_t n = y_.size();
-  for (const Index site : site_)
-    if (site != kFree && site >= sites_.size()) throw InputError(Place{}, fmt::format("the checkpoint names vent site {} of {}", site, sites_.size()));
-  for (const std::size_t other : {y_.v.size(), y_.rho.size(), y_.T.size(), id_.size(), birth_.size(), site_.size(), number_.size(), rest_.size(),
-                                  rest2_.size(), surface_.size(), outward_.size(), ground_bound_.size()})
-    if (other != n) throw InputError(Place{}, fmt::format("the checkpoint's arrays disagree: {} and {} particles", n, other));
+  check_loaded_sizes(n, {y_.v.size(), y_.rho.size(), y_.T.size(), surface_.size(), outward_.size()});
+  census_.check_loaded(n);
+  emitter_.check_loaded(n);
+  frames_.check_loaded(n);
+  ground_.check_loaded(n);
 }
 
 }  // namespace effuse::flow::sph

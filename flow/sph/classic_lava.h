@@ -9,12 +9,14 @@
 
 #include "flow/integrate/integrate.h"
 #include "flow/sph/column_grid.h"
+#include "flow/sph/emitter.h"
+#include "flow/sph/ground.h"
 #include "flow/sph/kernel.h"
+#include "flow/sph/material_frame.h"
 #include "flow/sph/surface_particles.h"
 #include "flow/sph/vent.h"
 #include "geometry/base/hash.h"
 #include "geometry/base/state_io.h"
-#include "geometry/collide/contact.h"
 #include "geometry/mesh/points.h"
 
 /// The lava of Stora, Agliati, Cani, Neyret & Gascuel 1999, "Animating Lava Flows", on the smoothed
@@ -65,9 +67,6 @@ struct ClassicOptions {
   Real heat_step() const;
 };
 
-/// Fills out[i] with the nearest surface to x[i] of one solid (any() false: none within reach).
-using ContactSource = std::function<void(std::span<const Vec3> x, Real reach, std::span<geometry::Contact> out)>;
-
 /// What the integrator moves; the rates have the same layout.
 struct LavaState {
   std::vector<Vec3> x, v;      ///< [m], [m/s]
@@ -109,8 +108,7 @@ struct StepReport {
 /// pressure (ground does not pull) and density, twice its approach speed (so that the work of the pressure is what the density
 /// takes up: with the speed alone the ground pumps energy into the flow). Drag of the ground as of a
 /// neighbour at rest. A hard projection at the end of the step keeps every particle at least
-/// spacing / 4 outside. Both ask only about particles that may have come near since their distance was
-/// last measured: a distance is 1-Lipschitz, so last distance minus path is a bound.
+/// spacing / 4 outside; it asks only about those that may have come near since the step began (see Ground).
 ///
 /// Density by continuity grows noise over thousands of steps: a diffusion of density
 ///   2 delta (support/2) sqrt(k) sum_j (m/rho_j) (rho_j - rho_i) (x_j - x_i) . grad W_ij / r^2
@@ -148,8 +146,8 @@ class ClassicLava {
   std::size_t size() const { return y_.size(); }
   Real particle_mass() const { return mass_; }
   Real volume() const { return static_cast<Real>(size()) * mass_ / options_.density; }  ///< at rest density [m^3]
-  Real mass_emitted() const { return static_cast<Real>(emitted_) * mass_; }             ///< by vents and add() [kg]
-  Real mass_left() const { return static_cast<Real>(left_) * mass_; }                   ///< over the ground's edge [kg]
+  Real mass_emitted() const { return static_cast<Real>(census_.emitted()) * mass_; }     ///< by vents and add() [kg]
+  Real mass_left() const { return static_cast<Real>(census_.left()) * mass_; }           ///< over the ground's edge [kg]
   const LavaState& state() const { return y_; }
   const ClassicOptions& options() const { return options_; }
   /// Views, valid until the next step. crust: 0 at the hot end of the viscosity law, 1 at the cold.
@@ -166,39 +164,23 @@ class ClassicLava {
   void load(StateReader& in);
 
  private:
-  static constexpr Index kFree = ~Index{0};
-  struct Site {
-    Vec3 at, up;  // on the ground, and its normal there
-    Index vent;
-    Real share;  // of the vent's volume that makes one particle come out here [m^3]
-    Real phase;  // 0..1: how far its first particle is on its way
-  };
-  void place_sites();
   std::size_t emit(Real t0, Real t1);
-  void born(const Vec3& x, const Vec3& v, Real temperature);
-  void carry(Real dt);  // sets the speed of the particles that vents carry
-  void keep(const std::vector<Index>& which);  // drops all other particles, in this order
+  void born(const Vec3& x, const Vec3& v, Real temperature);  // without its part in emitter_ and frames_
+  void keep(std::span<const Index> which);  // drops all other particles, in this order
   void sort_particles();
   void find_neighbors(std::span<const Vec3> x);
-  void find_contacts();
   /// The solver as the integrator sees it.
   struct System;
   void compute_rates(const LavaState& y, LavaState& k, bool velocities, bool positions);
   template <bool kVelocities, bool kPositions, class Kernel>
   void accumulate(const Kernel& kernel, const LavaState& y, LavaState& k);
-  void push_out_of_ground();        // the hard projection
   std::size_t drop_what_left();     // returns how many
   bool try_step(Real dt);           // false: the state is not fit to go on from
   bool acceptable(const LavaState& y) const;
-  void renew_rest();
   template <class Self, class Archive>
   static void archive(Self& self, Archive& io);  // save, load and hash: one list, one order
 
   ClassicOptions options_;
-  std::vector<Vent> vents_;
-  std::vector<ContactSource> ground_;
-  std::function<bool(const Vec3&)> inside_;
-  std::vector<Site> sites_;
   Real mass_, support_;
   HalfSpaceTable half_space_;        // of the kernel
   CubicSpline density_kernel_;       // of the summed density: exact to 0.03 % on a lattice at support 2
@@ -206,17 +188,14 @@ class ClassicLava {
 
   // The state, all of it saved.
   LavaState y_;
-  std::vector<std::uint64_t> id_;
-  std::vector<Real> birth_;         // [s]
-  std::vector<Index> site_;         // the vent's site that carries the particle; kFree: none
-  std::vector<Real> number_;        // which of that site's particles it is
-  std::vector<Vec3> rest_, rest2_;
+  Census census_;
+  Ground ground_;
+  Emitter emitter_;
+  MaterialFrames frames_;
   std::vector<std::uint8_t> surface_;
   std::vector<Vec3> outward_;
-  std::vector<Real> ground_bound_;  // [m]: the ground is not nearer than this
   Real time_ = 0;
-  Real rest_born_ = 0, rest2_born_ = 0;
-  std::uint64_t next_id_ = 0, emitted_ = 0, left_ = 0, steps_ = 0;
+  std::uint64_t steps_ = 0;
   Real max_acceleration_ = 0;  // of the last step: the next one's size depends on it
 
   // Derived at each evaluation; kept for their memory.
@@ -230,10 +209,6 @@ class ClassicLava {
   Neighbors neighbors_;
   const Vec3* neighbors_of_ = nullptr;  // positions they were found for; null: none that still stand
   std::vector<Packed> packed_;
-  std::vector<geometry::Contact> contacts_;        // sources one after another, each over contact_of_
-  std::vector<Index> contact_of_;                  // particles that have contacts, rising
-  std::vector<Index> contact_index_;               // particle -> place in contact_of_, or ~0
-  std::vector<Vec3> query_;
   LavaState before_;
   StepStorage<LavaState> storage_;
   mutable std::vector<Real> radius_, crust_, age_;  // what points() shows

@@ -35,4 +35,13 @@ ExitCode check(const CheckCommand& command, const CommonOptions& common);
 ExitCode info(const std::vector<std::filesystem::path>& files, const CommonOptions& common);
 ExitCode effects(const CommonOptions& common);
 
+/// `effuse study`; not called study, which is a namespace.
+struct StudyCommand {
+  std::vector<std::string> names;  ///< of studies; empty: all
+  std::filesystem::path folder;
+  std::vector<std::string> cases;  ///< only these; empty: all, or all quick ones
+  bool full = false, resume = false, strict = false, list = false;
+};
+ExitCode run_studies(const StudyCommand& command, const CommonOptions& common);
+
 }  // namespace effuse

@@ -97,7 +97,7 @@ void FrameWriter::write_contact_sheet(int frames) {
   if (!pictures.empty()) skin::write_contact_sheet(folder_ / "preview" / "contact_sheet.png", pictures, labels, 3);
 }
 
-void FrameWriter::write_manifest(int frames_done) const {
+void FrameWriter::write_manifest(int frames_done, const std::vector<std::pair<std::string, std::string>>& flow) const {
   using nlohmann::ordered_json;
   const geometry::Georeference& geo = terrain_.georeference();
   ordered_json m;
@@ -123,6 +123,7 @@ void FrameWriter::write_manifest(int frames_done) const {
   if (settings_.vdb) files["vdb"] = "frames/lava.####.vdb";
   if (settings_.preview) files["preview"] = "preview/preview.####.png";
   m["files"] = files;
+  for (const auto& [name, path] : flow) m["flow"][name] = path;
   m["attributes"] = {{"temperature", "K"}, {"velocity", "m/s"}, {"crust", "0 molten .. 1 solid"}};
   ordered_json times = ordered_json::array();
   for (int frame = 1; frame <= frames_done; ++frame) times.push_back(scene_.frame_time(frame));

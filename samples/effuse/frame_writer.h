@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "flow/scene/scene.h"
@@ -35,8 +36,8 @@ class FrameWriter {
   /// preview/contact_sheet.png of twelve pictures spread over the film; nothing without pictures.
   void write_contact_sheet(int frames);
 
-  /// manifest.json: what is where, in which units.
-  void write_manifest(int frames_done) const;
+  /// manifest.json: what is where, in which units. flow: names and paths of maps and series (FlowWriter::files).
+  void write_manifest(int frames_done, const std::vector<std::pair<std::string, std::string>>& flow) const;
 
  private:
   skin::Metadata metadata(int frame, Real time) const;

@@ -7,6 +7,7 @@
 #include "geometry/base/zones.h"
 #include "importers/scene/scene_file.h"
 #include "importers/terrain/import_terrain.h"
+#include "samples/effuse/flow_writer.h"
 
 namespace effuse {
 
@@ -67,6 +68,7 @@ std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const
   }
   if (faults.empty() && loaded->terrain) {
     loaded->simulation = std::make_unique<flow::Simulation>(scene, flow::World{&*loaded->terrain, scene.seed});
+    check_map(loaded->skin, *loaded->terrain, *loaded->simulation);
     flow::Node resolved = root.resolved();
     // The resolved scene is written elsewhere: there, too, it must find its terrain.
     for (auto& [name, table] : resolved.entries) {

@@ -107,15 +107,25 @@ int main(int argc, char** argv) {
 
   CLI::App* effects_verb = add_common(app.add_subcommand("effects", "the effects there are, and their parameters"));
 
+  effuse::StudyCommand study;
+  CLI::App* study_verb = add_common(app.add_subcommand("study", "compare effuse with exact, converged and measured references: tables, curves, plots, a page"));
+  study_verb->add_option("name", study.names, "studies: validation; all when absent");
+  study_verb->add_option("-o,--output", study.folder, "folder to write; out/study when absent");
+  study_verb->add_option("--case", study.cases, "run this case only; may be given several times")->allow_extra_args(false);
+  study_verb->add_flag("--full", study.full, "the slow cases, too: minutes each");
+  study_verb->add_flag("--resume", study.resume, "keep the results of this version that the folder holds (DIR/cases; remove a file there to run its case anew)");
+  study_verb->add_flag("--strict", study.strict, "exit 1 when a figure misses its bar");
+  study_verb->add_flag("--list", study.list, "print the cases there are, and run none");
+
   // What goes wrong before the arguments are parsed keeps the promise of --json, too.
   const bool asks_json = std::find(argv + 1, argv + argc, std::string_view("--json")) != argv + argc;
 
   // A typing error in the verb: name the nearest one instead of CLI11's list.
   if (argc > 1 && argv[1][0] != '-') {
-    const std::vector<std::string> verbs = {"run", "check", "info", "effects"};
+    const std::vector<std::string> verbs = {"run", "check", "info", "effects", "study"};
     if (std::find(verbs.begin(), verbs.end(), argv[1]) == verbs.end()) {
       const std::string nearest = effuse::nearest_name(argv[1], verbs);
-      return report(ExitCode::kBadInput, fmt::format("no verb '{}'; {}", argv[1], nearest.empty() ? "there are run, check, info, effects" : "did you mean '" + nearest + "'?"), asks_json);
+      return report(ExitCode::kBadInput, fmt::format("no verb '{}'; {}", argv[1], nearest.empty() ? "there are run, check, info, effects, study" : "did you mean '" + nearest + "'?"), asks_json);
     }
   }
   try {
@@ -133,6 +143,7 @@ int main(int argc, char** argv) {
     if (*check_verb) return flushed(effuse::check(check, common));
     if (*info_verb) return flushed(effuse::info(files, common));
     if (*effects_verb) return flushed(effuse::effects(common));
+    if (*study_verb) return flushed(effuse::run_studies(study, common));
   } catch (const effuse::InputError& error) {
     return report(ExitCode::kBadInput, error.faults(), common.json);
   } catch (const effuse::UnstableError& error) {

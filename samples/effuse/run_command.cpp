@@ -17,6 +17,7 @@
 #include "geometry/base/parallel.h"
 #include "geometry/base/zones.h"
 #include "samples/effuse/commands.h"
+#include "samples/effuse/flow_writer.h"
 #include "samples/effuse/frame_writer.h"
 #include "samples/effuse/load_scene.h"
 #include "samples/effuse/progress.h"
@@ -171,9 +172,10 @@ std::string resume_line(const RunCommand& command, const fs::path& folder) {
   return line + " --resume";
 }
 
-/// Restores the newest checkpoint that is whole; false when there is none at all.
-bool go_on(const fs::path& folder, LoadedScene& loaded) {
+/// Restores the newest checkpoint that is whole, and what the maps had gathered by then; false when there is none at all.
+bool go_on(const fs::path& folder, LoadedScene& loaded, FlowWriter& flow_writer) {
   const std::vector<fs::path> checkpoints = flow::checkpoints(folder);
+  bool whole = false;
   for (const fs::path& checkpoint : checkpoints) {
     const std::string bytes = read_file(checkpoint);
     if (!flow::undamaged(bytes)) {
@@ -181,8 +183,13 @@ bool go_on(const fs::path& folder, LoadedScene& loaded) {
       continue;
     }
     loaded.simulation->restore(bytes, loaded.key, checkpoint.string());
-    return true;
+    if (flow_writer.restore()) return true;
+    whole = true;
+    log_warning(fmt::format("{} has no sound record of the maps and flow.csv beside it, going back to the one before", checkpoint.string()));
   }
+  if (whole)
+    throw InputError(Place{(folder / "checkpoints").string()},
+                     "no checkpoint has a record of the maps and flow.csv beside it (flow.*.state): --set output.maps=false --set output.series=false goes on without them, --force starts anew");
   if (!checkpoints.empty()) throw InputError(Place{(folder / "checkpoints").string()}, "every checkpoint is damaged or of another version; --force starts anew");
   return false;
 }
@@ -206,17 +213,18 @@ ExitCode run(const RunCommand& command, const CommonOptions& common) {
   if (was_there && !command.resume && !command.force)
     throw InputError(Place{folder.string()}, "holds a run already: --resume goes on with it, --force starts anew, -o names another folder");
 
+  FlowWriter flow_writer(*loaded, folder);
   const OutputFolder held(folder);
   RunRecord record(*loaded, folder);
   if (command.resume && was_there) {
-    if (go_on(folder, *loaded)) {
+    if (go_on(folder, *loaded, flow_writer)) {
       record.read(simulation.frame());
       log_info(fmt::format("going on after frame {}", simulation.frame()));
     } else {
       log_info("no checkpoint yet: starting from the first frame");
     }
   } else if (was_there) {
-    for (const char* old : {"frames", "preview", "checkpoints", "run.json", "manifest.json"}) fs::remove_all(folder / old);
+    for (const char* old : {"frames", "preview", "maps", "checkpoints", "flow.csv", "run.json", "manifest.json"}) fs::remove_all(folder / old);
   }
 
   FrameWriter writer(scene, loaded->skin, *loaded->terrain, folder);
@@ -229,6 +237,13 @@ ExitCode run(const RunCommand& command, const CommonOptions& common) {
     std::string text;
     for (const auto& effect : simulation.effects()) text += (text.empty() ? "" : "; ") + effect->status();
     return text;
+  };
+
+  // The record of the maps before the checkpoint it belongs to.
+  const auto save_state = [&] {
+    flow_writer.save_record();
+    flow::write_checkpoint(folder, simulation, loaded->key);
+    flow_writer.remove_old_records();
   };
 
   std::string outcome = "done";
@@ -246,17 +261,19 @@ ExitCode run(const RunCommand& command, const CommonOptions& common) {
       }
       const FrameWriter::Result result = writer.write_frame(simulation);
       record.add_frame(simulation, result);
+      flow_writer.add_frame();
       progress.frame_done(simulation.frame(), fmt::format("{}, {} triangles", status(), result.triangles));
       if (simulation.frame() % loaded->skin.checkpoint_every == 0 || simulation.frame() == scene.frames) {
         // The record first: killed in between, it holds more frames than the checkpoint, never fewer.
         record.write(record.document(simulation, profile, "running"));
-        flow::write_checkpoint(folder, simulation, loaded->key);
-        writer.write_manifest(simulation.frame());
+        save_state();
+        flow_writer.write_series();
+        writer.write_manifest(simulation.frame(), flow_writer.files());
       }
     }
     if (code == ExitCode::kInterrupted) {
       record.write(record.document(simulation, profile, outcome));
-      flow::write_checkpoint(folder, simulation, loaded->key);
+      save_state();
     }
     if (code == ExitCode::kDone) writer.write_contact_sheet(scene.frames);
   } catch (const UnstableError& error) {
@@ -265,7 +282,7 @@ ExitCode run(const RunCommand& command, const CommonOptions& common) {
     outcome = std::string("unstable: ") + error.what();
     code = ExitCode::kUnstable;
     record.write(record.document(simulation, profile, outcome));
-    flow::write_checkpoint(folder, simulation, loaded->key);  // the state before the step that failed
+    save_state();  // as before the step that failed
   } catch (const std::exception& error) {
     const bool full = dynamic_cast<const ResourceError*>(&error) || dynamic_cast<const std::bad_alloc*>(&error);
     progress.end();
@@ -274,7 +291,9 @@ ExitCode run(const RunCommand& command, const CommonOptions& common) {
   }
   progress.end();
 
-  writer.write_manifest(simulation.frame());
+  flow_writer.write_series();
+  flow_writer.write_maps();
+  writer.write_manifest(simulation.frame(), flow_writer.files());
   const ordered_json document = record.document(simulation, profile, outcome);
   record.write(document);
   if (!common.quiet && !common.json) {

@@ -45,6 +45,15 @@ SkinSettings read_skin_settings(flow::Parameters& root) {
   s.glb = has(2);
   s.vdb = has(3);
   s.checkpoint_every = static_cast<int>(output.integer("checkpoint_every", s.checkpoint_every, 1, 10000, "frames between two checkpoints"));
+  s.maps = output.flag("maps", s.maps, "maps/: largest thickness, highest temperature, arrival time, deposit");
+  const std::vector<std::size_t> map_formats = output.choices("map_formats", {"tif", "asc"}, {0, 1}, "GeoTIFF, ESRI ASCII");
+  s.map_tif = std::find(map_formats.begin(), map_formats.end(), std::size_t{0}) != map_formats.end();
+  s.map_asc = std::find(map_formats.begin(), map_formats.end(), std::size_t{1}) != map_formats.end();
+  s.map_cell = output.number("map_cell", "m", s.map_cell, Parameters::not_negative(), "side of a map's cell; 0: as the terrain's, over a mesh two particle spacings");
+  s.map_cell_place = output.place("map_cell");
+  s.arrival_thickness = output.number("arrival_thickness", "m", s.arrival_thickness, Parameters::not_negative(), "lava has arrived where it is thicker; 0: half a particle spacing");
+  s.thickness_every = static_cast<int>(output.integer("thickness_every", s.thickness_every, 0, 1'000'000, "frames between two maps of the thickness; 0: none"));
+  s.series = output.flag("series", s.series, "flow.csv: front, area, volume, discharge, temperatures, heat budget of every frame");
 
   Parameters preview = root.table("preview", "a ray-traced picture for each frame");
   s.preview = preview.flag("pictures", s.preview, "make them");

@@ -21,6 +21,13 @@ struct SkinSettings {
 
   bool ply = true, obj = true, glb = true, vdb = true;
   int checkpoint_every = 10;  ///< frames
+  // For people who study flows: maps of the whole run, and a line of figures a frame.
+  bool maps = true, map_tif = true, map_asc = true;
+  Real map_cell = 0;           ///< side of a map's cell [m]; 0: the terrain's, over a mesh two particle spacings
+  Place map_cell_place;        ///< in the scene
+  Real arrival_thickness = 0;  ///< lava has arrived where it is thicker [m]; 0: half a particle spacing
+  int thickness_every = 0;     ///< frames between two maps of the thickness; 0: none
+  bool series = true;
 
   bool preview = true;
   PreviewOptions picture;

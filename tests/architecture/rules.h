@@ -117,6 +117,7 @@ inline const std::vector<Package>& packages() {
       {"toml++", {"toml++/", "toml.hpp"}, {"importers"}},
       {"nlohmann/json", {"nlohmann/"}, {"skin", "importers", "samples"}},
       {"CLI11", {"CLI/"}, {"samples"}},
+      {"Cairo", {"cairo"}, {"samples"}},
       {"fmt", {"fmt/"}, {"geometry", "flow", "skin", "importers", "samples"}},
       {"sanitizers", {"sanitizer/"}, {"geometry/base"}},
   };

@@ -1,0 +1,281 @@
+#include "flow/effects/modern_lava_effect.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "flow/effects/lava_rheology.h"
+#include "flow/sph/lava_presets.h"
+#include "flow/sph/modern_lava.h"
+#include "geometry/base/parallel.h"
+
+namespace effuse::flow {
+
+namespace {
+
+using sph::HeatOptions;
+using sph::LavaPreset;
+using sph::ModernLava;
+using sph::ModernOptions;
+using sph::ModernReport;
+using sph::Vent;
+
+constexpr Parameters::Range kTemperature = {0, 5000, true};
+constexpr Parameters::Range kTolerance = {0, 0.1, true};
+
+template <std::size_t N>
+std::vector<std::string> names(const std::string_view (&list)[N]) {
+  return {std::begin(list), std::end(list)};
+}
+
+class ModernLavaEffect final : public Effect {
+ public:
+  ModernLavaEffect(const ModernOptions& options, std::vector<Vent> vents, const geometry::Terrain& terrain)
+      : lava_(options, std::move(vents),
+              {[terrain](std::span<const Vec3> x, Real reach, std::span<geometry::Contact> out) { terrain.contacts(x, reach, out); }},
+              [terrain](const Vec3& p) { return terrain.height(p.x(), p.y()).has_value(); }),
+        heat_(options.heat.on) {}
+
+  std::string_view name() const override { return "lava"; }
+  Real time() const override { return lava_.time(); }
+
+  void step(Real t_end) override {
+    last_ = lava_.step(t_end - lava_.time());
+    Totals& t = totals_;
+    t.steps += 1;
+    t.retries += last_.retries;
+    t.pressure_iterations += last_.pressure_iterations;
+    t.viscosity_iterations += last_.viscosity_iterations;
+    t.density_iterations += last_.density_iterations;
+    t.smallest_step = std::min(t.smallest_step, last_.dt);
+    t.density_error = std::max(t.density_error, last_.density_error);
+    if (heat_) book_heat();
+  }
+
+  geometry::Points points() const override { return lava_.points(); }
+  Real volume() const override { return lava_.volume(); }
+  Real spacing() const override { return lava_.options().spacing; }
+  std::size_t memory() const override { return lava_.memory(); }
+  void add_to(StateHash& hash) const override { lava_.add_to(hash); }
+  void save(StateWriter& out) const override {
+    lava_.save(out);
+    archive(*this, out);
+  }
+  void load(StateReader& in) override {
+    lava_.load(in);
+    archive(*this, in);
+  }
+
+  std::vector<std::pair<std::string, double>> figures() const override {
+    const Totals& t = totals_;
+    const auto n = static_cast<double>(lava_.size());
+    const auto mean = [&](Real sum) { return t.steps > 0 ? sum / t.steps : 0; };
+    const std::span<const Real> T = lava_.temperatures();
+    std::vector<std::pair<std::string, double>> figures = {
+        {"particles", n},
+        {"volume_m3", lava_.volume()},
+        {"mass_emitted_kg", lava_.mass_emitted()},
+        {"mass_present_kg", n * lava_.particle_mass()},
+        {"mass_left_kg", lava_.mass_left()},
+        {"steps", t.steps},
+        {"smallest_step_s", t.steps > 0 ? t.smallest_step : 0},
+        {"retries", t.retries},
+        {"awake", static_cast<double>(last_.awake)},
+        {"pressure_iterations", mean(t.pressure_iterations)},
+        {"viscosity_iterations", mean(t.viscosity_iterations)},
+        {"density_iterations", mean(t.density_iterations)},
+        {"density_error", t.density_error},
+        {"max_speed_m_s", last_.max_speed},
+    };
+    if (n > 0) {
+      figures.emplace_back("min_temperature_K", -parallel_max(T.size(), -1e300, [&](std::size_t i) { return -T[i]; }));
+      figures.emplace_back("mean_temperature_K", parallel_sum(T.size(), 0.0, [&](std::size_t i) { return T[i]; }) / n);
+      figures.emplace_back("max_temperature_K", parallel_max(T.size(), 0, [&](std::size_t i) { return T[i]; }));
+    }
+    if (heat_) {
+      for (const auto& [key, value] : {std::pair("radiated_J", t.radiated), {"convected_J", t.convected}, {"ground_J", t.ground}, {"vent_J", t.vent},
+                                       {"viscous_J", t.viscous}, {"stored_J", t.stored}, {"left_J", t.left}})
+        figures.emplace_back(key, value);
+    }
+    return figures;
+  }
+
+  std::string status() const override {
+    const std::string resting = last_.awake < lava_.size() ? fmt::format(" ({} awake)", last_.awake) : "";
+    const std::string temperature = heat_ && lava_.size() > 0 ? fmt::format(", {:.0f} degC", last_.min_temperature - kZeroCelsius) : "";
+    return fmt::format("{} particles{}, {:.2g} m/s{}, dt {:.3g} s", lava_.size(), resting, last_.max_speed, temperature, last_.dt);
+  }
+
+ private:
+  /// Of all steps so far; numbers as the figures show them. Heat in J.
+  struct Totals {
+    Real steps = 0, retries = 0;
+    Real pressure_iterations = 0, viscosity_iterations = 0, density_iterations = 0;
+    Real smallest_step = 1e9, density_error = 0;
+    Real radiated = 0, convected = 0, ground = 0, viscous = 0, vent = 0, left = 0;
+    Real stored = 0;  // now
+  };
+
+  void book_heat() {
+    Totals& t = totals_;
+    const sph::HeatBudget& booked = last_.heat;
+    t.radiated += booked.radiated;
+    t.convected += booked.convected;
+    t.ground += booked.ground;
+    t.viscous += booked.dissipated;
+    // The newest particles stand at the end, and nothing has touched their heat.
+    Real born = 0;
+    for (const Real enthalpy : lava_.heat().enthalpy().last(last_.emitted)) born += lava_.heat().particle_mass() * enthalpy;
+    t.vent += born;
+    const Real before = t.stored;
+    t.stored = lava_.heat().total_enthalpy();
+    if (last_.left > 0) t.left += before + born + booked.dissipated - booked.radiated - booked.convected - booked.ground - t.stored;
+  }
+
+  /// A run resumed reports the whole.
+  template <class Self, class Archive>
+  static void archive(Self& self, Archive& io) {
+    auto& t = self.totals_;
+    io.value("steps", t.steps);
+    io.value("retries", t.retries);
+    io.value("pressure_iterations", t.pressure_iterations);
+    io.value("viscosity_iterations", t.viscosity_iterations);
+    io.value("density_iterations", t.density_iterations);
+    io.value("smallest_step", t.smallest_step);
+    io.value("density_error", t.density_error);
+    io.value("radiated", t.radiated);
+    io.value("convected", t.convected);
+    io.value("ground", t.ground);
+    io.value("viscous", t.viscous);
+    io.value("vent", t.vent);
+    io.value("left", t.left);
+    io.value("stored", t.stored);
+    io.value("awake", self.last_.awake);
+    io.value("max_speed", self.last_.max_speed);
+  }
+
+  ModernLava lava_;
+  bool heat_;
+  ModernReport last_;
+  Totals totals_;
+};
+
+void read_heat(Parameters p, const LavaPreset* preset, bool on, HeatOptions& h) {
+  const auto not_negative = Parameters::not_negative();
+  if (preset) {
+    h.curve = {preset->heat_capacity, preset->latent_heat_released(), preset->solidus, preset->eruption_temperature};
+    h.conductivity = preset->conductivity;
+    h.air.emissivity = preset->emissivity;
+    h.air.convection = preset->convection;
+  }
+  h.air.air_temperature = 288.15;
+  h.on = p.flag("on", on, "false: every particle keeps its temperature, nothing is computed; true when there is a preset or a table [lava.heat]");
+  h.curve.heat_capacity = p.number("heat_capacity", "J/(kg K)", h.curve.heat_capacity, {1, 1e6}, "");
+  h.curve.latent_heat = p.number("latent_heat", "J/kg", h.curve.latent_heat, {0, 1e8}, "set free from liquidus to solidus, a kilogram of lava");
+  h.curve.solidus = p.number("solidus", "K", h.curve.solidus, kTemperature, "all of the latent heat is out below");
+  h.curve.liquidus = p.number("liquidus", "K", h.curve.liquidus, kTemperature, "none of it is out above");
+  if (h.curve.liquidus < h.curve.solidus) p.fault(p.has("liquidus") ? "liquidus" : "solidus", fmt::format("the liquidus, {:g} K, is below the solidus, {:g} K", h.curve.liquidus, h.curve.solidus));
+  h.conductivity = p.number("conductivity", "W/(m K)", h.conductivity, {0, 1e4, true}, "of the melt, its bubbles included");
+  h.solid_conductivity = p.number("solid_conductivity", "W/(m K)", h.solid_conductivity, {0, 1e4}, "of the solid; 0: as the melt");
+  h.air.thompson_ramsey = p.choice("emissivity_law", {"constant", "thompson_ramsey"}, 0, "of temperature: thompson_ramsey is 1.0463 - 1.48144e-4 T (2021)") == 1;
+  h.air.emissivity = p.number("emissivity", "", h.air.emissivity, {0, 1}, "of law constant");
+  h.air.convection = p.number("convection", "W/(m2 K)", h.air.convection, {0, 1e6}, "heat transfer to the air; figures in use range from 9 to 75");
+  h.air.air_temperature = p.number("air_temperature", "K", h.air.air_temperature, kTemperature, "of air and sky");
+  // Effusivity's own unit has a root in it, which units here have not. Soil: 2 W/(m K) and 2.2 MJ/(m3 K).
+  const Real k = p.number("ground_conductivity", "W/(m K)", 2, {0, 1e4}, "of the ground, which warms up under the lava; its temperature is terrain.temperature; 0: insulates");
+  const Real rho_c = p.number("ground_heat_capacity", "J/(m3 K)", 2.2e6, {1, 1e9}, "of a cubic metre of ground");
+  h.ground_effusivity = std::sqrt(k * rho_c);
+  h.ground_conductance = p.number("ground_conductance", "W/(m2 K)", h.ground_conductance, {0, 1e6}, "of a plate in the ground's place, its far side at the ground's temperature; 0: none");
+  h.viscous_heating = p.flag("viscous_heating", h.viscous_heating, "friction inside the lava warms it");
+  h.crust = p.flag("crust", h.crust, "a conductive column on each exposed particle: what glows is its thin skin; false: each particle cools and glows as a whole");
+  h.crust_temperature = p.number("crust_temperature", "K", h.crust_temperature, kTemperature, "what is colder is crust");
+  h.longest_interval = p.number("longest_interval", "s", h.longest_interval, not_negative, "between two exchanges among particles");
+}
+
+// Conduction over a particle this many times faster than the step would take thousands of passes over the pairs.
+constexpr Real kMostDiffusion = 1e4;
+
+/// Steps by the Courant number with a guessed speed: that of a film fed by the vents along their length, on a slope of 0.3, no
+/// thinner than a spacing; never faster than lava that falls freely through 10 m.
+Real guess_speed(const ModernOptions& o, const std::vector<PlannedVent>& vents) {
+  constexpr Real kSlope = 0.3, kFall = 10;
+  Real fastest = 0;
+  for (const PlannedVent& v : vents) {
+    const Real q = v.vent.rate / std::max((v.to - v.from).norm(), v.vent.width);
+    Real shear = 1, speed = 0;
+    for (int k = 0; k < 20; ++k) {  // shear thins it
+      const Real nu = o.rheology.viscosity(v.vent.temperature, shear) / o.density;
+      const Real depth = std::max(std::cbrt(3 * nu * q / (kGravity * kSlope)), o.spacing);
+      speed = 1.5 * q / depth;
+      shear = 2 * speed / depth;
+    }
+    fastest = std::max(fastest, speed);
+  }
+  return std::min(fastest, std::sqrt(2 * kGravity * kFall));
+}
+
+Estimate estimate(const ModernOptions& o, const std::vector<PlannedVent>& vents, Real duration) {
+  Estimate e;
+  const Real volume = std::pow(o.spacing, 3);
+  e.particles = let_out(vents, duration) / volume;
+  const Real speed = guess_speed(o, vents);
+  const Real dt = std::min({o.max_step, o.courant * o.spacing / std::max(speed, 1e-30), o.courant * std::sqrt(o.spacing / kGravity)});
+  e.steps = duration / dt;
+  e.bytes = 1500 * e.particles;
+  e.seconds = e.steps * mean_let_out(vents, duration) / volume * 6e-6;
+  return e;
+}
+
+}  // namespace
+
+LavaModel read_modern_lava(Parameters& p) {
+  ModernOptions o;
+  std::vector<std::string> presets = {"none"};
+  for (const std::string& name : sph::lava_preset_names()) presets.push_back(name);
+  const std::size_t chosen = p.choice("preset", presets, 0, "a real lava: the defaults of rheology, density, heat and the vents' temperature");
+  const LavaPreset* preset = chosen > 0 ? sph::find_lava_preset(presets[chosen]) : nullptr;
+
+  const auto positive = Parameters::positive(), not_negative = Parameters::not_negative();
+  o.spacing = p.number("spacing", "m", std::nullopt, positive, "between particles at rest: the resolution");
+  o.support = p.number("support", "", o.support, {1.5, 4}, "radius of the kernel, in spacings: 3 is right to some per cent, 2 three times as fast and 20 % off");
+  o.kernel = static_cast<sph::KernelKind>(p.choice("kernel", names(sph::kKernelNames), static_cast<std::size_t>(o.kernel), "smoothing kernel of density and pressure"));
+  o.density = p.number("density", "kg/m3", preset ? preset->density : o.density, {1, 1e5}, "bubbles included");
+  o.rheology = read_rheology(p, preset);
+  read_heat(p.table("heat", "what the lava loses, and to what"), preset, preset || p.has("heat"), o.heat);
+  o.crust_viscosity = p.number("crust_viscosity", "Pa s", o.crust_viscosity, {0, 1e15}, "of crust; its share of a particle's thickness adds this to the viscosity; 0: crust does not stiffen");
+  o.crust_strength = p.number("crust_strength", "Pa", o.crust_strength, {0, 1e9}, "stress at which crust gives; 0: it never does");
+  o.slip_length = p.number("slip_length", "m", o.slip_length, not_negative, "on the ground: 0 is no slip, far more than the lava's depth free slip");
+  o.courant = p.number("courant", "", o.courant, {0, 2, true}, "of the step: share of the time in which the fastest particle moves one spacing");
+  o.max_step = p.number("max_step", "s", o.max_step, positive, "no step is longer");
+  o.min_step = p.number("min_step", "s", o.min_step, positive, "a run that would need a shorter one ends");
+  o.divergence_tolerance = p.number("divergence_tolerance", "", o.divergence_tolerance, kTolerance, "of the pressure solve: change of density a step may leave, rms");
+  o.density_tolerance = p.number("density_tolerance", "", o.density_tolerance, kTolerance, "of taking compression back, rms");
+  o.viscosity_tolerance = p.number("viscosity_tolerance", "", o.viscosity_tolerance, {0, 1e-2, true}, "of the viscosity solve: residual over right-hand side");
+  o.max_iterations = static_cast<int>(p.integer("max_iterations", o.max_iterations, 1, 1000000, "of either solve"));
+  o.coupling = static_cast<int>(p.integer("coupling", o.coupling, 1, 20, "pressure and viscosity are solved this often a step"));
+  const Real pace = p.number("sleep_pace", "s", 3600, not_negative, "lava that would take longer than this to move one spacing falls asleep; 0: never");
+  o.sleep_speed = pace > 0 ? o.spacing / pace : 0;
+  o.sleep_delay = p.number("sleep_delay", "s", o.sleep_delay, not_negative, "once it has been that slow for so long");
+  o.rest_period = p.number("rest_period", "s", o.rest_period, not_negative, "material coordinates are renewed this often; 0: never");
+  if (o.rest_period > 0 && o.rest_period < 1e-3) p.fault("rest_period", "must be 0 s, or at least 0.001 s");
+
+  const Real diffusion = std::max(o.heat.conductivity, o.heat.solid_conductivity) / (o.density * o.heat.curve.heat_capacity) * o.max_step / (o.spacing * o.spacing);
+  if (o.spacing > 0 && o.heat.on && !(diffusion <= kMostDiffusion))
+    p.fault("spacing", fmt::format("heat would cross {:.3g} particles of this size in a step, at most {:.0f}: a larger spacing, a smaller max_step or heat.conductivity would do", std::sqrt(diffusion),
+                                   std::sqrt(kMostDiffusion)));
+
+  LavaModel model;
+  model.spacing = o.spacing;
+  if (preset) model.vent_temperature = preset->eruption_temperature;
+  model.sets_the_step = "max_step, courant, spacing and the vents' rates";
+  model.estimate = [o](const std::vector<PlannedVent>& vents, Real duration) { return estimate(o, vents, duration); };
+  model.make = [o](std::vector<Vent> vents, const geometry::Terrain& terrain, std::uint64_t seed) -> std::unique_ptr<Effect> {
+    ModernOptions options = o;
+    options.seed = seed;
+    return std::make_unique<ModernLavaEffect>(options, std::move(vents), terrain);
+  };
+  return model;
+}
+
+}  // namespace effuse::flow

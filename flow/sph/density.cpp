@@ -1,0 +1,178 @@
+#include "flow/sph/density.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "flow/sph/pair_kernels.h"
+#include "flow/sph/viscosity.h"
+#include "geometry/base/check.h"
+#include "geometry/base/parallel.h"
+#include "geometry/base/zones.h"
+
+namespace effuse::flow::sph {
+
+namespace {
+constexpr std::size_t kGrain = 256;  // particles a thread takes at a time
+constexpr Real kUnseen = 1e9;   // depth of lava whose surface is far, in spacings
+constexpr Real kNearOff = 1.2;  // spacings below the free surface: nearer, its distance is sure
+constexpr Real kFlat = 0.05;     // of a full neighbourhood's moment: with less there is no gradient in that direction
+constexpr Real kNearestWall = 0.25;  // spacings: nearer walls shear no harder
+constexpr Real kLoose = 0.8;    // of the density: with less a particle is a drop or in a sheet
+constexpr Real kDrop = 4.83597586;  // area of a ball of the particle's volume, in faces: (36 pi)^(1/3); a sheet has 2
+}  // namespace
+
+Real lattice_sum(KernelKind kernel, Real support, Real spacing) {
+  ParticleSystem s;
+  s.kernel = kernel;
+  s.support = support;
+  return with_kernel(s, [&](const auto& W, auto) {
+    Real sum = 0;
+    const int m = static_cast<int>(support / spacing) + 1;
+    for (int i = -m; i <= m; ++i)
+      for (int j = -m; j <= m; ++j)
+        for (int k = -m; k <= m; ++k) sum += W.W(spacing * std::sqrt(static_cast<Real>(i * i + j * j + k * k)));
+    return sum * spacing * spacing * spacing;
+  });
+}
+
+void find_shape(const ParticleSystem& s, Real lattice, const FilmFriction& film, Walls& walls, FlowShape& shape) {
+  ZONE("sph.density");
+  const std::size_t n = s.size();
+  const Real dx = s.spacing, face = dx * dx;
+  for (auto* array : {&shape.density, &shape.off, &shape.missing, &shape.exposed, &shape.grounded}) array->resize(n);
+  shape.surface.resize(n);
+  shape.slope.resize(n);
+  std::vector<Real> depth(n);
+  const auto share = [dx](Real distance) { return std::clamp(1.5 - distance / dx, 0.0, 1.0); };
+
+  const Real own = with_kernel(s, [&](const auto& W, auto) { return s.volume() * W.W(0); });
+  // Faces of air by lack of density: a power of it, through one particle alone and one in a sheet.
+  const Real alone = own / lattice;
+  const Real sheet = with_kernel(s, [&](const auto& W, auto) {
+    Real sum = 0;
+    for (int reach = static_cast<int>(s.support / dx) + 1, a = -reach; a <= reach; ++a)
+      for (int b = -reach; b <= reach; ++b) sum += W.W(dx * std::sqrt(static_cast<Real>(a * a + b * b)));
+    return sum * s.volume() / lattice;
+  });
+  const Real power = std::log(kDrop / 2) / std::log((1 - alone) / (1 - sheet));
+  const PairsOf pairs(s);
+  parallel_ranges(n, kGrain, [&](std::size_t begin, std::size_t end) {
+    pairs->density(begin, end, shape.density, shape.slope);
+    for (std::size_t i = begin; i < end; ++i) {
+      Real sum = own + shape.density[i];
+      Vec3 slope = shape.slope[i];
+      shape.grounded[i] = 0;
+      for (const Wall& wall : walls[i]) {
+        const BoundaryTable::Row row = s.boundary->at(wall.distance);
+        sum += row.gamma;
+        slope += row.slope * wall.normal;
+        shape.grounded[i] = std::max(shape.grounded[i], face * share(wall.distance));
+      }
+      const Real off = s.boundary->distance_of_slope(slope.norm());
+      shape.off[i] = off;
+      shape.missing[i] = s.boundary->at(off).gamma / lattice;
+      const Real density = sum / lattice + shape.missing[i];
+      shape.density[i] = density;
+      shape.surface[i] = off < 0.9 * dx || density < kLoose;
+      Real exposed = share(off);
+      if (density < kLoose) exposed = std::max(exposed, kDrop * std::pow((1 - density) / (1 - alone), power));
+      shape.exposed[i] = face * exposed;
+
+      // Depth of the film, where the free surface is near and across from the wall.
+      depth[i] = kUnseen;
+      if (off < kNearOff * dx)
+        for (const Wall& wall : walls[i])
+          if (slope.dot(wall.normal) < 0) depth[i] = std::min(depth[i], wall.distance + off);
+    }
+  });
+
+  parallel_for(n, [&](std::size_t i) {
+    if (walls.first[i] == walls.first[i + 1]) return;
+    Real sum = depth[i], seen = 1;
+    if (depth[i] == kUnseen) {
+      sum = seen = 0;
+      for (const Index j : (*s.neighbors)[i]) {
+        if (depth[j] == kUnseen) continue;
+        sum += depth[j];
+        seen += 1;
+      }
+    }
+    const Real friction = film.at(seen > 0 ? sum / seen : kUnseen * dx);
+    for (Index w = walls.first[i]; w < walls.first[i + 1]; ++w) walls.walls[w].friction = friction;
+  });
+}
+
+void bend_walls(const ParticleSystem& s, Walls& walls, std::vector<Real>& distances) {
+  distances.resize(walls.walls.size());
+  for (std::size_t w = 0; w < distances.size(); ++w) distances[w] = walls.walls[w].distance;
+  const Real most = 0.5 * s.spacing;
+  parallel_for(s.size(), [&](std::size_t i) {
+    for (Index w = walls.first[i]; w < walls.first[i + 1]; ++w) {
+      const Wall wall = walls.walls[w];
+      // Feet of the neighbours' perpendiculars on the same surface: on a sphere of radius R normals differ by feet / R.
+      Real turn = 0, length = 0;
+      for (const Index j : (*s.neighbors)[i]) {
+        for (const Wall& other : walls[j]) {
+          if (other.surface != wall.surface) continue;
+          const Vec3 foot = s.separation<true>(j, i) - other.reach * other.normal + wall.reach * wall.normal;
+          turn += (other.normal - wall.normal).dot(foot);
+          length += foot.squaredNorm();
+        }
+      }
+      const Real curvature = length > 0 ? 2 * turn / length : 0;
+      const BoundaryTable::Row row = s.boundary->at(wall.reach);
+      walls.walls[w].curvature = curvature;
+      if (row.slope < 0) walls.walls[w].distance = wall.reach + std::clamp(-curvature * row.bend / row.slope, -most, most);
+    }
+  });
+}
+
+void shear_rate_squared(const ParticleSystem& s, Real slip_length, std::span<const Vec3> v, std::span<Real> out) {
+  ZONE("sph.shear rate");
+  CHECK_EQ(v.size(), s.size());
+  CHECK_EQ(out.size(), s.size());
+  with_kernel(s, [&](const auto& W, auto periodic) {
+    parallel_for(s.size(), [&](std::size_t i) {
+      Mat3 gradient = Mat3::Zero(), moment = Mat3::Zero();
+      for (const Index j : (*s.neighbors)[i]) {
+        const Vec3 d = s.template separation<decltype(periodic)::value>(i, j);
+        const Real r = d.norm();
+        if (r == 0) continue;
+        const Vec3 slope = s.volume() * W.dW(r) / r * d;
+        gradient += (v[j] - v[i]) * slope.transpose();
+        moment -= d * slope.transpose();
+      }
+      for (const Wall& wall : (*s.walls)[i]) {
+        const BoundaryTable::Row row = s.boundary->at(wall.distance);
+        const Real depth = std::max(wall.distance, kNearestWall * s.spacing) + slip_length;
+        const Mat3 across = wall.normal * wall.normal.transpose();
+        gradient += row.moment_n / depth * (v[i] - wall.velocity) * wall.normal.transpose();
+        moment += row.moment_n * across + row.moment_t * (Mat3::Identity() - across);
+      }
+      // The inverse, without the directions that the neighbours say nothing of.
+      const Eigen::SelfAdjointEigenSolver<Mat3> eigen(moment);
+      Vec3 inverse = Vec3::Zero();
+      for (int k = 0; k < 3; ++k)
+        if (eigen.eigenvalues()[k] > kFlat) inverse[k] = 1 / eigen.eigenvalues()[k];
+      const Mat3 G = gradient * (eigen.eigenvectors() * inverse.asDiagonal() * eigen.eigenvectors().transpose());
+      out[i] = 0.5 * (G + G.transpose()).squaredNorm();
+    });
+  });
+}
+
+void dissipation(const ParticleSystem& s, std::span<const Real> mu, Real slip_length, std::span<const Vec3> v, std::span<Real> out) {
+  ZONE("sph.dissipation");
+  CHECK_EQ(mu.size(), s.size());
+  CHECK_EQ(v.size(), s.size());
+  CHECK_EQ(out.size(), s.size());
+  const PairsOf pairs(s);
+  pairs->set_viscosity(mu);
+  parallel_ranges(s.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    pairs->friction_power(begin, end, v, out);
+    // Of a pair's power each has half.
+    for (std::size_t i = begin; i < end; ++i) out[i] = out[i] / 2 + wall_dissipation(s, mu[i], slip_length, v[i], i);
+  });
+}
+
+}  // namespace effuse::flow::sph

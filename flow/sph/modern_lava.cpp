@@ -1,0 +1,599 @@
+#include "flow/sph/modern_lava.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "flow/sph/awake.h"
+#include "flow/sph/density.h"
+#include "flow/sph/emitter.h"
+#include "flow/sph/material_frame.h"
+#include "flow/sph/pair_kernels.h"
+#include "flow/sph/particle_system.h"
+#include "flow/sph/pressure.h"
+#include "flow/sph/viscosity.h"
+#include "geometry/base/check.h"
+#include "geometry/base/error.h"
+#include "geometry/base/parallel.h"
+#include "geometry/base/zones.h"
+
+namespace effuse::flow::sph {
+
+namespace {
+constexpr int kSortInterval = 16;    // steps between two orderings of the particles in memory, and looks for what left
+constexpr int kMaxRetries = 8;
+constexpr Real kClearance = 0.25;    // a particle stays this many spacings off the ground
+constexpr Real kTakeBack = 0.2;      // share of a density that is too large that one step takes back
+constexpr Real kFillUp = 0.2;        // share of a density that is too low that compression may make up in one step
+constexpr Real kWake = 2;            // times sleep_speed
+constexpr std::string_view kModel = "modern 1";  // of a checkpoint: changes with what is saved
+
+BoundaryTable make_table(KernelKind kind, Real support, Real spacing) {
+  switch (kind) {
+    case KernelKind::kCubicSpline: return {CubicSpline(support), spacing};
+    case KernelKind::kSpiky: return {SpikyKernel(support), spacing};
+    default: return {WendlandC2(support), spacing};
+  }
+}
+
+Real rms(std::span<const Real> values) {
+  if (values.empty()) return 0;
+  return std::sqrt(parallel_sum(values.size(), 0.0, [&](std::size_t i) { return values[i] * values[i]; }) / static_cast<Real>(values.size()));
+}
+
+Real largest_norm(std::span<const Vec3> a) {
+  return std::sqrt(parallel_max(a.size(), 0, [&](std::size_t i) { return a[i].squaredNorm(); }));
+}
+}  // namespace
+
+struct ModernLava::Impl {
+  ModernOptions o;
+  Real support, volume, mass, lattice;
+  BoundaryTable table;
+  FilmFriction film;
+
+  // The state, all of it saved. By particle:
+  std::vector<Vec3> x, v;
+  std::vector<Real> q;                  // p / rho [m^2/s^2]
+  std::vector<Real> mu, density;        // of the last step
+  std::vector<Real> exposed, grounded;  // [m^2]
+  std::vector<Real> ground_T;           // of the ground it lies on [K]
+  std::vector<Real> slow;               // [s] for how long it has been slow
+  std::vector<std::uint8_t> surface, asleep;
+  Census census;
+  MaterialFrames frames;
+  Ground ground;
+  Emitter emitter;
+  Heat heat;
+  Real time = 0, acceleration = 0;      // largest, of the last step
+  std::uint64_t steps = 0;
+
+  // Of the step: the particles it looks at, by place in `set`.
+  AwakeSet set;
+  ColumnGrid grid;
+  Neighbors neighbors;
+  Walls walls;
+  FlowShape shape;
+  PairKernels pairs;
+  std::vector<Vec3> lx, lv, start, predicted, work, shift;
+  std::vector<Real> lq, lmu, rate, least, kappa, scratch, wall_distances;
+  std::vector<std::uint8_t> fixed;
+  ViscositySolver viscosity;
+  PressureSolver pressure;
+  std::vector<Vec3> before_x, before_v;
+  // What points() shows.
+  mutable std::vector<Real> radius, crust, age, p;
+
+  Impl(const ModernOptions& options, std::vector<Vent> vents, std::vector<ContactSource> sources, std::function<bool(const Vec3&)> inside)
+      : o(options),
+        support(o.support * o.spacing),
+        volume(std::pow(o.spacing, 3)),
+        mass(volume * o.density),
+        lattice(lattice_sum(o.kernel, support, o.spacing)),
+        table(make_table(o.kernel, support, o.spacing)),
+        film(table, o.spacing),
+        frames(o.rest_period),
+        ground({support, support, kClearance * o.spacing, 8}, std::move(sources), std::move(inside)),
+        emitter(std::move(vents), o.spacing, o.seed, ground.sources()),
+        heat(o.heat, o.spacing, o.density) {
+    CHECK_GT(o.spacing, 0.0);
+    CHECK_GE(o.support, 1.5);
+    CHECK_GT(o.density, 0.0);
+    CHECK_GT(o.courant, 0.0);
+    CHECK_GT(o.max_step, 0.0);
+    CHECK_GE(o.coupling, 1);
+    CHECK(o.slip_length >= 0);
+    for (const int axis : {0, 1}) CHECK(o.period[axis] == 0 || o.period[axis] >= 2 * support);
+    CHECK(o.period.isZero() || o.sleep_speed == 0);
+    o.rheology.check();
+  }
+
+  std::size_t size() const { return x.size(); }
+
+  void born(const Vec3& at, const Vec3& velocity, Real temperature) {
+    x.push_back(at);
+    v.push_back(velocity);
+    q.push_back(0);
+    mu.push_back(o.rheology.viscosity(temperature, 0));
+    density.push_back(1);
+    exposed.push_back(0);
+    grounded.push_back(0);
+    ground_T.push_back(o.ground_temperature);
+    slow.push_back(0);
+    surface.push_back(1);
+    asleep.push_back(0);
+    census.born(time);
+    ground.born();
+    heat.born(temperature);
+  }
+
+  void keep(std::span<const Index> which) {
+    gather(x, which);
+    gather(v, which);
+    gather(q, which);
+    gather(mu, which);
+    gather(density, which);
+    gather(exposed, which);
+    gather(grounded, which);
+    gather(ground_T, which);
+    gather(slow, which);
+    gather(surface, which);
+    gather(asleep, which);
+    census.keep(which);
+    frames.keep(which);
+    ground.keep(which);
+    emitter.keep(which);
+    heat.keep(which);
+  }
+
+  template <class Self, class Archive>
+  static void archive(Self& self, Archive& io) {
+    io.array("x", self.x);
+    io.array("v", self.v);
+    io.array("q", self.q);
+    io.array("mu", self.mu);
+    io.array("density", self.density);
+    io.array("exposed", self.exposed);
+    io.array("grounded", self.grounded);
+    io.array("ground_T", self.ground_T);
+    io.array("slow", self.slow);
+    io.array("surface", self.surface);
+    io.array("asleep", self.asleep);
+    Census::arrays(self.census, io);
+    MaterialFrames::arrays(self.frames, io);
+    Ground::arrays(self.ground, io);
+    Emitter::arrays(self.emitter, io);
+    MaterialFrames::values(self.frames, io);
+    Census::values(self.census, io);
+    io.value("time", self.time);
+    io.value("acceleration", self.acceleration);
+    io.value("steps", self.steps);
+  }
+
+  ParticleSystem system() {
+    ParticleSystem s;
+    s.x = lx;
+    s.neighbors = &neighbors;
+    s.walls = &walls;
+    s.boundary = &table;
+    s.kernel = o.kernel;
+    s.support = support;
+    s.spacing = o.spacing;
+    s.period = o.period;
+    s.fixed = fixed;
+    s.pairs = &pairs;
+    return s;
+  }
+
+  std::size_t drop_what_left() {
+    if (!ground.has_edge()) return 0;
+    const std::vector<Index> stay = ground.who_stays(x, surface, o.spacing);
+    const std::size_t gone = size() - stay.size();
+    if (gone > 0) keep(stay);
+    census.count_left(gone);
+    return gone;
+  }
+
+  void sort_particles() {
+    ZONE("sph.sort");
+    grid.build(x, support);
+    keep(grid.order());
+  }
+
+  /// Lists of all particles at `at`, of the nearest images where the flow is periodic.
+  void find_neighbors(std::span<const Vec3> at) {
+    if (o.period.isZero()) {
+      grid.build(at, support);
+      neighbors.find(grid, support);
+      return;
+    }
+    std::vector<Vec3> extended(at.begin(), at.end());
+    std::vector<Index> image;
+    for (const int axis : {0, 1}) {
+      const Real length = o.period[axis];
+      if (length <= 0) continue;
+      const std::size_t now = extended.size();
+      for (std::size_t i = 0; i < now; ++i) {
+        for (const Real by : {length, -length}) {
+          Vec3 y = extended[i];
+          y[axis] += by;
+          if (y[axis] <= -support || y[axis] >= length + support) continue;
+          extended.push_back(y);
+          image.push_back(i < at.size() ? static_cast<Index>(i) : image[i - at.size()]);
+        }
+      }
+    }
+    grid.build(extended, support);
+    neighbors.find(grid, support);
+    neighbors.fold(at.size(), image);
+  }
+
+  /// The walls of the set's particles.
+  void find_walls() {
+    const auto& particles = set.particles;
+    if (particles.size() == size()) {
+      ground.find(x, [&](std::size_t i) { return !emitter.held(i); });
+    } else {
+      std::vector<std::uint8_t> wanted(size());
+      for (const Index i : particles) wanted[i] = !emitter.held(i);
+      ground.find(x, [&](std::size_t i) { return wanted[i] != 0; });
+    }
+    walls.first.assign(particles.size() + 1, 0);
+    walls.walls.clear();
+    for (std::size_t k = 0; k < particles.size(); ++k) {
+      ground.for_each_contact(particles[k], x[particles[k]], [&](const geometry::Contact& c, Real d) {
+        walls.walls.push_back({.normal = c.normal, .distance = d, .reach = d, .surface = c.surface, .velocity = c.surface_velocity, .temperature = c.surface_temperature});
+      });
+      walls.first[k + 1] = static_cast<Index>(walls.walls.size());
+    }
+  }
+
+  /// Everything that depends on positions alone.
+  void look_around() {
+    if (set.particles.empty()) return;
+    find_neighbors(lx);
+    find_walls();
+    const ParticleSystem s = system();
+    pairs.build(s);
+    bend_walls(s, walls, wall_distances);
+    find_shape(s, lattice, film, walls, shape);
+    const std::size_t moving = set.awake + set.drowsy;
+    parallel_for(moving, [&](std::size_t k) {
+      const Index i = set.particles[k];
+      density[i] = shape.density[k];
+      surface[i] = shape.surface[k];
+      exposed[i] = emitter.held(i) ? 0 : shape.exposed[k];
+      grounded[i] = shape.grounded[k];
+      Real nearest = support;
+      for (const Wall& wall : walls[k]) {
+        if (wall.reach >= nearest) continue;
+        nearest = wall.reach;
+        ground_T[i] = wall.temperature > 0 ? wall.temperature : o.ground_temperature;
+      }
+    }, 2048);
+  }
+
+  /// Apparent viscosities of the set's particles, from the velocities the step starts with.
+  void find_viscosities() {
+    const std::size_t m = set.particles.size();
+    lmu.resize(m);
+    scratch.assign(m, 0.0);
+    const bool crusted = o.heat.on && o.crust_viscosity > 0;
+    if (o.rheology.needs_strain_rate() || crusted) shear_rate_squared(system(), o.slip_length, lv, scratch);
+    const std::span<const Real> T = heat.temperature(), crust_thickness = heat.crust_thickness();
+    parallel_for(m, [&](std::size_t k) {
+      const Index i = set.particles[k];
+      const Real shear = std::sqrt(scratch[k]);
+      Real mu_k = o.rheology.viscosity(T[i], shear);
+      if (crusted && crust_thickness[i] > 0) {
+        // The crust's share of the thickness: viscous up to its strength.
+        const Real stiff = o.crust_strength > 0 && shear * o.crust_viscosity > o.crust_strength ? o.crust_strength / shear : o.crust_viscosity;
+        mu_k += std::min(crust_thickness[i] / o.spacing, 1.0) * stiff;
+      }
+      lmu[k] = mu_k;
+      mu[i] = mu_k;
+    }, 1024);
+  }
+
+  /// The implicit step of velocities, pressures and positions of the set, from `start` and q. False: give it up.
+  bool try_step(Real dt, ModernReport& report) {
+    const std::size_t m = set.particles.size();
+    const ParticleSystem s = system();
+    rate.resize(m);
+    least.assign(m, 0.0);
+    predicted.resize(m);
+    work.resize(m);
+    lv = start;
+    parallel_for(m, [&](std::size_t k) {
+      lq[k] = std::max(q[set.particles[k]], 0.0);
+      rate[k] = std::max(1 - shape.density[k], 0.0) * kFillUp / dt;
+    }, 2048);
+    report.pressure_iterations = report.viscosity_iterations = report.density_iterations = 0;
+    for (int round = 0; round < o.coupling; ++round) {
+      pressure_acceleration(s, lq, work);
+      parallel_for(m, [&](std::size_t k) { predicted[k] = s.is_fixed(k) ? start[k] : Vec3(start[k] + dt * (work[k] + o.gravity)); }, 2048);
+      const ViscosityResult viscous = viscosity.solve(s, o.density, lmu, o.slip_length, dt, predicted, o.viscosity_tolerance, o.max_iterations, lv);
+      report.viscosity_iterations += viscous.iterations;
+      report.viscosity_residual = viscous.residual;
+      if (!(viscous.residual < 100 * o.viscosity_tolerance)) return false;
+      const PressureResult pressed = pressure.solve(s, rate, least, dt, o.divergence_tolerance, o.max_iterations, lv, lq);
+      report.pressure_iterations += pressed.iterations;
+      report.divergence_error = pressed.error;
+    }
+    // Where density is too large, out of it; nothing else may be compressed by that.
+    shift.assign(m, Vec3::Zero());
+    if (report.density_error > o.density_tolerance) {
+      kappa.assign(m, 0.0);
+      parallel_for(m, [&](std::size_t k) {
+        const Real excess = shape.density[k] - 1;
+        rate[k] = excess > 0 ? -kTakeBack * excess : -0.5 * excess;
+      }, 2048);
+      report.density_iterations = pressure.solve(s, rate, least, 1, o.density_tolerance, o.max_iterations, shift, kappa).iterations;
+    }
+    const Real limit = o.spacing / 2;
+    return parallel_max(m, 0, [&](std::size_t k) {
+             const Vec3 path = dt * lv[k] + shift[k];
+             return path.squaredNorm() < limit * limit && std::isfinite(lq[k]) ? 0.0 : 1.0;  // not a number: 1
+           }) == 0;
+  }
+
+  Real stable_step() const {
+    Real dt = o.max_step;
+    const Real speed = largest_norm(v);
+    if (speed > 0) dt = std::min(dt, o.courant * o.spacing / speed);
+    if (acceleration > 0) dt = std::min(dt, o.courant * std::sqrt(o.spacing / acceleration));
+    return dt;
+  }
+
+  void fall_asleep(Real dt) {
+    if (o.sleep_speed <= 0) return;
+    for (std::size_t k = 0; k < set.awake + set.drowsy; ++k) {
+      const Index i = set.particles[k];
+      const Real speed = lv[k].norm();
+      if (k >= set.awake) {  // a sleeper, moved along
+        if (speed <= kWake * o.sleep_speed) continue;
+        asleep[i] = 0;
+        slow[i] = 0;
+      } else if (speed > o.sleep_speed || emitter.held(i)) {
+        slow[i] = 0;
+      } else if ((slow[i] += dt) >= o.sleep_delay) {
+        asleep[i] = 1;
+        v[i].setZero();
+      }
+    }
+  }
+
+  void heat_step(Real dt, ModernReport& report) {
+    if (!o.heat.on) return;
+    ZONE("sph.heat");
+    const bool all = set.awake == size();  // then places are the particles' own
+    scratch.clear();
+    std::vector<Real> power;
+    if (o.heat.viscous_heating && !set.particles.empty()) {
+      scratch.resize(set.particles.size());
+      dissipation(system(), lmu, o.slip_length, lv, scratch);
+      if (!all) {
+        power.assign(size(), 0.0);
+        for (std::size_t k = 0; k < set.awake; ++k) power[set.particles[k]] = scratch[k];
+      }
+    }
+    // Lists of the step's beginning are good enough for conduction; sleepers have none.
+    if (heat.conducts(dt) && !all) find_neighbors(x);
+    report.heat = heat.step(dt, {.x = x,
+                                 .neighbors = neighbors,
+                                 .kernel = o.kernel,
+                                 .support = support,
+                                 .period = o.period,
+                                 .sky_area = exposed,
+                                 .ground_area = grounded,
+                                 .ground_temperature = ground_T,
+                                 .dissipation = all ? std::span<const Real>(scratch) : std::span<const Real>(power)});
+  }
+
+  std::size_t emit(Real t0, Real t1) {
+    const std::span<const Emitter::Newborn> newborn = emitter.emit(t0, t1);
+    for (const Emitter::Newborn& b : newborn) {
+      born(b.x, b.v, b.temperature);
+      // What comes out of a vent was, when the material coordinates were born, that far down the conduit.
+      frames.born(b.x - emitter.rise(b.site, frames.rest_born(), t1), b.x - emitter.rise(b.site, frames.rest2_born(), t1));
+    }
+    return newborn.size();
+  }
+
+  ModernReport step(Real dt_max) {
+    ZONE("sph.step");
+    CHECK_GT(dt_max, 0.0);
+    ModernReport report;
+    if (steps % kSortInterval == 0) {
+      report.left = drop_what_left();
+      if (std::find(asleep.begin(), asleep.end(), 0) != asleep.end()) sort_particles();
+    }
+    Real dt = std::min(dt_max, stable_step());
+    if (dt_max - dt < 1e-6 * dt) dt = dt_max;  // no crumb of a step is left over
+    if (dt < dt_max && dt < o.min_step)
+      throw UnstableError(fmt::format("at t = {:.6g} s speed or acceleration leave a step of {:.3g} s, less than min_step {:.3g} s ({} particles)", time, dt, o.min_step, size()));
+
+    emitter.carry(time, dt, v);
+    set.find(x, asleep, support);
+    const std::size_t m = set.particles.size();
+    lx.resize(m);
+    start.resize(m);
+    lv.resize(m);
+    lq.resize(m);
+    fixed.resize(m);
+    parallel_for(m, [&](std::size_t k) {
+      const Index i = set.particles[k];
+      lx[k] = x[i];
+      lv[k] = start[k] = v[i];
+      fixed[k] = k >= set.awake + set.drowsy || emitter.held(i);
+    }, 2048);
+    look_around();
+    if (m > 0) find_viscosities();
+    if (m == 0) neighbors = {};
+    std::vector<Real> excess(set.awake);
+    parallel_for(set.awake, [&](std::size_t k) { excess[k] = std::max(shape.density[k] - 1, 0.0); }, 4096);
+    report.density_error = rms(excess);
+
+    for (;; ++report.retries, dt /= 2) {
+      if (m == 0 || try_step(dt, report)) break;
+      if (report.retries == kMaxRetries)
+        throw UnstableError(fmt::format("the step at t = {:.6g} s stayed unstable down to dt = {:.3g} s ({} particles)", time, dt, size()));
+      emitter.carry(time, dt / 2, v);
+      parallel_for(m, [&](std::size_t k) { start[k] = v[set.particles[k]]; }, 2048);
+    }
+    before_x = x;
+    parallel_for(set.awake, [&](std::size_t k) {
+      const Index i = set.particles[k];
+      v[i] = lv[k];
+      q[i] = lq[k];
+      x[i] += dt * lv[k] + shift[k];
+    }, 2048);
+    acceleration = 0;
+    if (m > 0) acceleration = std::sqrt(parallel_max(set.awake, 0, [&](std::size_t k) { return ((lv[k] - start[k]) / dt).squaredNorm(); }));
+    ground.moved(before_x, x);
+    ground.project(x, v, [&](std::size_t i) { return !emitter.held(i) && !asleep[i]; });
+    fall_asleep(dt);
+    wrap();
+    heat_step(dt, report);
+    time += dt;
+    ++steps;
+    report.emitted = emit(time - dt, time);
+    frames.renew(time, x);
+
+    report.dt = dt;
+    report.awake = set.awake;
+    report.neighbor_pairs = neighbors.pairs();
+    report.max_speed = largest_norm(v);
+    const std::span<const Real> T = heat.temperature();
+    report.max_temperature = parallel_max(size(), 0, [&](std::size_t i) { return T[i]; });
+    report.min_temperature = -parallel_max(size(), -1e6, [&](std::size_t i) { return -T[i]; });
+    COUNT("sph.steps", 1);
+    COUNT("sph.awake particles", set.awake);
+    return report;
+  }
+
+  void wrap() {
+    for (const int axis : {0, 1}) {
+      const Real length = o.period[axis];
+      if (length > 0) parallel_for(size(), [&](std::size_t i) { x[i][axis] -= length * std::floor(x[i][axis] / length); }, 4096);
+    }
+  }
+};
+
+ModernLava::ModernLava(const ModernOptions& options, std::vector<Vent> vents, std::vector<ContactSource> ground, std::function<bool(const Vec3&)> inside)
+    : impl_(std::make_unique<Impl>(options, std::move(vents), std::move(ground), std::move(inside))) {}
+ModernLava::~ModernLava() = default;
+ModernLava::ModernLava(ModernLava&&) noexcept = default;
+ModernLava& ModernLava::operator=(ModernLava&&) noexcept = default;
+
+void ModernLava::add(std::span<const Vec3> x, std::span<const Vec3> v, std::span<const Real> temperature) {
+  CHECK_EQ(v.size(), x.size());
+  CHECK_EQ(temperature.size(), x.size());
+  Impl& m = *impl_;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    CHECK(x[i].allFinite() && v[i].allFinite() && std::isfinite(temperature[i]));
+    m.born(x[i], v[i], temperature[i]);
+    m.emitter.add_free();
+    m.frames.born(x[i], x[i]);
+  }
+}
+
+ModernReport ModernLava::step(Real dt_max) { return impl_->step(dt_max); }
+Real ModernLava::time() const { return impl_->time; }
+std::size_t ModernLava::size() const { return impl_->size(); }
+const ModernOptions& ModernLava::options() const { return impl_->o; }
+Real ModernLava::particle_mass() const { return impl_->mass; }
+Real ModernLava::volume() const { return impl_->volume * static_cast<Real>(size()); }
+Real ModernLava::mass_emitted() const { return impl_->mass * static_cast<Real>(impl_->census.emitted()); }
+Real ModernLava::mass_left() const { return impl_->mass * static_cast<Real>(impl_->census.left()); }
+std::span<const Vec3> ModernLava::positions() const { return impl_->x; }
+std::span<const Vec3> ModernLava::velocities() const { return impl_->v; }
+std::span<const Real> ModernLava::temperatures() const { return impl_->heat.temperature(); }
+std::span<const Real> ModernLava::viscosities() const { return impl_->mu; }
+std::span<const Real> ModernLava::densities() const { return impl_->density; }
+std::span<const std::uint8_t> ModernLava::surface() const { return impl_->surface; }
+std::span<const std::uint8_t> ModernLava::asleep() const { return impl_->asleep; }
+std::span<const std::uint64_t> ModernLava::ids() const { return impl_->census.ids(); }
+const Heat& ModernLava::heat() const { return impl_->heat; }
+
+std::span<const Real> ModernLava::pressures() const {
+  Impl& m = *impl_;
+  m.p.resize(m.size());
+  for (std::size_t i = 0; i < m.size(); ++i) m.p[i] = m.q[i] * m.o.density;
+  // The neighbours are those of the step's beginning, and so are the places they belong to.
+  const std::size_t n = m.set.particles.size();
+  if (n == 0) return m.p;
+  std::vector<Real> raw(n), smooth(n);
+  for (std::size_t k = 0; k < n; ++k) raw[k] = m.p[m.set.particles[k]];
+  smooth_linear(m.system(), raw, smooth);
+  for (std::size_t k = 0; k < m.set.awake; ++k) m.p[m.set.particles[k]] = std::max(smooth[k], 0.0);
+  return m.p;
+}
+
+geometry::Points ModernLava::points() const {
+  const Impl& m = *impl_;
+  const std::size_t n = m.size();
+  m.radius.assign(n, m.o.spacing / 2);
+  m.crust.resize(n);
+  m.age.resize(n);
+  const bool hot = m.o.heat.on;
+  for (std::size_t i = 0; i < n; ++i) {
+    m.crust[i] = hot ? std::clamp(std::max(m.heat.crust_thickness()[i] / m.o.spacing, m.heat.solid_fraction()[i]), 0.0, 1.0) : 0;
+    m.age[i] = m.time - m.census.births()[i];
+  }
+  geometry::Points points;
+  points.position = m.x;
+  points.radius = m.radius;
+  points.velocity = m.v;
+  points.temperature = m.heat.surface_temperature();
+  points.crust = m.crust;
+  points.age = m.age;
+  points.id = m.census.ids();
+  points.surface = m.surface;
+  points.rest = m.frames.rest();
+  points.rest2 = m.frames.rest2();
+  points.rest_ratio = m.frames.ratio(m.time);
+  return points;
+}
+
+std::size_t ModernLava::memory() const {
+  const Impl& m = *impl_;
+  const auto bytes = [](const auto&... vectors) { return ((vectors.capacity() * sizeof(vectors[0])) + ...); };
+  return bytes(m.x, m.v, m.q, m.mu, m.density, m.exposed, m.grounded, m.ground_T, m.slow, m.surface, m.asleep) + m.census.memory() + m.frames.memory() +
+         m.ground.memory() + m.emitter.memory() + m.heat.memory() + m.grid.memory() + m.neighbors.memory() + m.pairs.memory() + m.shape.memory() + m.viscosity.memory() +
+         m.pressure.memory() + bytes(m.set.particles, m.walls.first, m.walls.walls, m.lx, m.lv, m.start, m.predicted, m.work, m.shift, m.lq, m.lmu, m.rate, m.least,
+                                     m.kappa, m.scratch, m.wall_distances, m.fixed, m.before_x, m.before_v, m.radius, m.crust, m.age, m.p);
+}
+
+void ModernLava::add_to(StateHash& hash) const {
+  HashArchive io{hash};
+  Impl::archive(*impl_, io);
+  impl_->heat.add_to(hash);
+}
+
+void ModernLava::save(StateWriter& out) const {
+  out.text("model", kModel);
+  Impl::archive(*impl_, out);
+  impl_->heat.save(out);
+}
+
+void ModernLava::load(StateReader& in) {
+  std::string model;
+  in.text("model", model);
+  if (model != kModel) throw InputError(Place{}, fmt::format("the checkpoint holds a '{:.40}' lava, wanted '{}'", model, kModel));
+  Impl& m = *impl_;
+  Impl::archive(m, in);
+  m.heat.load(in);
+  const std::size_t n = m.size();
+  check_loaded_sizes(n, {m.v.size(), m.q.size(), m.mu.size(), m.density.size(), m.exposed.size(), m.grounded.size(), m.ground_T.size(), m.slow.size(), m.surface.size(),
+                         m.asleep.size(), m.heat.size()});
+  m.census.check_loaded(n);
+  m.frames.check_loaded(n);
+  m.ground.check_loaded(n);
+  m.emitter.check_loaded(n);
+  m.set = {};
+}
+
+}  // namespace effuse::flow::sph

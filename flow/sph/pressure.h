@@ -1,0 +1,57 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "flow/sph/particle_system.h"
+
+namespace effuse::flow::sph {
+
+/// Rate of compression (1/rho) d rho / dt [1/s] of every particle:
+///
+///   (D v)_i = V sum_j (v_i - v_j) . grad W_ij  +  2 slope_i n . (v_i - v_wall)
+///
+/// the exact rate of the density summed over neighbours; beyond a wall the fluid moves as the mirror image.
+void compression_rate(const ParticleSystem& system, std::span<const Vec3> v, std::span<Real> out);
+
+/// Acceleration [m/s^2] by the kinematic pressures q = p / rho [m^2/s^2]:
+///
+///   a_i = - V sum_j (q_i + q_j) grad W_ij  -  2 q_i slope_i n   =  -(D^T q)_i
+///
+/// the transpose of D: pressure does the work that compression takes up, momentum is kept to rounding.
+void pressure_acceleration(const ParticleSystem& system, std::span<const Real> q, std::span<Vec3> out);
+
+/// A field through particles' values without their scatter: at each particle the value of the linear function that fits its
+/// neighbours and itself best, weighted by the kernel (moving least squares; linear fields come out unchanged). The
+/// particles' own pressures alternate by some tenths of rho g spacing: forces do not see that, a plot does.
+void smooth_linear(const ParticleSystem& system, std::span<const Real> values, std::span<Real> out);
+
+struct PressureResult {
+  int iterations = 0;
+  Real error = 0;  ///< rms over particles of dt (D v - rate) where that counts: change of density a step left to itself
+  bool converged = false;
+};
+
+/// Projects velocities so that no particle is compressed faster than it may be:
+///
+///   v += dt * pressure_acceleration(q_new - q_old),   D v <= rate,   q_new >= least,   either with equality
+///
+/// that is A q_new = (D v - rate) / dt + A q_old with A = D M D^T (M: 0 for fixed particles, 1 otherwise), bounded
+/// below: a symmetric, positive semidefinite problem, solved by modified proportioning with reduced gradient projections
+/// (MPRGP: conjugate gradients on the particles off their bound). v must have been accelerated by q_old already.
+/// With rate = 0 the velocities are free of divergence; a negative rate takes density back that is too large.
+/// The same operators as DFSPH (Bender & Koschier 2015), conjugate gradients in place of Jacobi's iteration.
+/// Source of MPRGP: Dostal & Schoeberl 2005, Comput. Optim. Appl. 30, 23-43.
+class PressureSolver {
+ public:
+  /// rate [1/s], least [m^2/s^2] (minus infinity: no bound), n each; v in, out; q in: old, out: new.
+  PressureResult solve(const ParticleSystem& system, std::span<const Real> rate, std::span<const Real> least, Real dt, Real tolerance, int max_iterations,
+                       std::span<Vec3> v, std::span<Real> q);
+  std::size_t memory() const;
+
+ private:
+  std::vector<Real> y_, low_, scale_, g_, p_, Ap_, work_;
+  std::vector<Vec3> a_;
+};
+
+}  // namespace effuse::flow::sph

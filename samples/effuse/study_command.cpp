@@ -1,0 +1,100 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "geometry/base/log.h"
+#include "samples/effuse/commands.h"
+#include "samples/study/run_study.h"
+#include "samples/study/study.h"
+
+namespace effuse {
+
+namespace {
+
+struct Study {
+  std::string name, what;
+  std::vector<study::Case> (*cases)();
+};
+
+std::vector<Study> studies() { return {{"validation", "the modern lava beside exact solutions, benchmarks and experiments", &study::validation_cases}}; }
+
+/// A log that nobody reads any more must not end a study.
+void say(const std::string& line) {
+  std::fwrite(line.data(), 1, line.size(), stderr);
+  std::fflush(stderr);
+}
+
+void print_list(const std::vector<Study>& chosen, const CommonOptions& common) {
+  nlohmann::ordered_json j = nlohmann::ordered_json::array();
+  for (const Study& one : chosen) {
+    nlohmann::ordered_json cases = nlohmann::ordered_json::array();
+    if (!common.json) fmt::print("{}: {}\n", one.name, one.what);
+    for (const study::Case& c : one.cases()) {
+      if (!common.json) fmt::print("  {:<24} {:<6} {}\n", c.name, c.quick ? "quick" : "slow", c.title);
+      cases.push_back({{"case", c.name}, {"title", c.title}, {"quick", c.quick}, {"source", c.source}});
+    }
+    j.push_back({{"study", one.name}, {"what", one.what}, {"cases", cases}});
+  }
+  if (common.json) print_document(j.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+}
+
+}  // namespace
+
+ExitCode run_studies(const StudyCommand& command, const CommonOptions& common) {
+  std::vector<std::string> names, case_names;
+  for (const Study& one : studies()) names.push_back(one.name);
+  study::require_known("study", command.names, names);
+  std::vector<Study> chosen = studies();
+  if (!command.names.empty()) std::erase_if(chosen, [&](const Study& one) { return std::find(command.names.begin(), command.names.end(), one.name) == command.names.end(); });
+  if (command.list) {
+    print_list(chosen, common);
+    return ExitCode::kDone;
+  }
+  // A case may belong to any of the studies asked for; a wrong name is told before the first of them runs.
+  std::vector<std::vector<study::Case>> cases;
+  for (const Study& one : chosen) {
+    cases.push_back(one.cases());
+    for (const study::Case& c : cases.back()) case_names.push_back(c.name);
+  }
+  study::require_known("case", command.cases, case_names);
+
+  ExitCode code = ExitCode::kDone;
+  nlohmann::ordered_json documents = nlohmann::ordered_json::array();
+  for (std::size_t s = 0; s < chosen.size(); ++s) {
+    study::StudyOptions options;
+    options.name = chosen[s].name;
+    options.version = EFFUSE_VERSION;
+    options.folder = command.folder.empty() ? std::filesystem::path("out") / "study" : command.folder;
+    options.full = command.full;
+    options.resume = command.resume;
+    for (const study::Case& c : cases[s])
+      if (std::find(command.cases.begin(), command.cases.end(), c.name) != command.cases.end()) options.only.push_back(c.name);
+    if (options.only.empty() && !command.cases.empty()) continue;  // its cases were not asked for
+
+    const study::StudyReport report = study::run_study(cases[s], options, [&](std::size_t k, std::size_t n, const study::Case& which, const study::Outcome* outcome) {
+      if (common.quiet) return;
+      const std::string head = fmt::format("[{:>{}}/{}] {}: ", k, std::to_string(n).size(), n, which.name);
+      if (!outcome) say(head + which.title + "\n");
+      else if (!outcome->failure.empty()) say(fmt::format("{}failed after {}: {}\n", head, study::duration_text(outcome->seconds), outcome->failure));
+      else say(fmt::format("{}{} of {} figures hold, {}\n", head, outcome->result.measures.size() - study::tally({*outcome}).missed, outcome->result.measures.size(), study::duration_text(outcome->seconds)));
+    });
+
+    const study::Tally t = study::tally(report.outcomes);
+    if (t.failed > 0 || (command.strict && t.missed > 0)) code = ExitCode::kFailed;
+    if (common.json) {
+      nlohmann::ordered_json document = nlohmann::ordered_json::parse(study::table_json(options.name, options.version, report.outcomes, report.not_run));
+      document["folder"] = options.folder.string();
+      documents.push_back(std::move(document));
+    } else {
+      fmt::print("{}", study::table_text(report.outcomes));
+    }
+    log_info(fmt::format("{}: {}; {}", options.name, study::summary(report.outcomes), (options.folder / (options.name + ".html")).string()));
+  }
+  // One study, one object: what scripts expect today; several come as a list.
+  if (common.json) print_document((documents.size() == 1 ? documents[0] : documents).dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  return code;
+}
+
+}  // namespace effuse
