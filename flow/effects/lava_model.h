@@ -16,7 +16,7 @@ struct LavaModel {
   Real vent_temperature = 1473.15;    ///< [K] of vents that do not say
   std::string sets_the_step;          ///< parameters that make steps short: for a fault
   std::function<Estimate(const std::vector<PlannedVent>& vents, Real duration)> estimate;
-  std::function<std::unique_ptr<Effect>(std::vector<sph::Vent> vents, const geometry::Terrain& terrain, std::uint64_t seed)> make;
+  std::function<std::unique_ptr<Effect>(const std::vector<sph::Vent>& vents, const geometry::Terrain& terrain, std::uint64_t seed)> make;
 };
 
 }  // namespace effuse::flow

@@ -37,7 +37,8 @@ struct ModernOptions {
   Real divergence_tolerance = 1e-4;  ///< of the pressure solve: rms change of density in a step it may leave
   Real density_tolerance = 2e-4;     ///< of taking density back that is too large, rms
   Real viscosity_tolerance = 1e-4;   ///< of the viscosity solve: residual over right-hand side
-  int max_iterations = 1000;         ///< of either solve
+  int density_iterations = 4;        ///< at most, of that: it goes on in the next step
+  int max_iterations = 1000;         ///< of the pressure and viscosity solves
   int coupling = 1;          ///< pressure and viscosity are solved this often a step
   Real sleep_speed = 0;      ///< [m/s]: particles that are slower for sleep_delay fall asleep; 0: never
   Real sleep_delay = 10;     ///< [s]
@@ -125,6 +126,7 @@ class ModernLava {
 
   void add_to(StateHash& hash) const;
   void save(StateWriter& out) const;
+  /// Throws InputError where what was saved does not fit; this is then unchanged.
   void load(StateReader& in);
 
  private:

@@ -76,7 +76,7 @@ INLINE void load_vectors(const double* v, const Index* j, D8& x, D8& y, D8& z) {
 }
 INLINE D8 load_scalars(const double* q, const Index* j) { return each([&](auto k) { return q[j[k]]; }); }
 INLINE double sum(const D8& a) { return ((a.at[0] + a.at[4]) + (a.at[2] + a.at[6])) + ((a.at[1] + a.at[5]) + (a.at[3] + a.at[7])); }
-#include "flow/sph/pair_kernels_body.h"
+#include "flow/sph/pair_kernels_internal.h"
 }  // namespace scalar
 
 #if defined(__x86_64__)
@@ -129,7 +129,7 @@ INLINE double sum(D8 p) {
   const __m128d two = _mm_add_pd(_mm256_castpd256_pd128(four), _mm256_extractf128_pd(four, 1));
   return _mm_cvtsd_f64(two) + _mm_cvtsd_f64(_mm_unpackhi_pd(two, two));
 }
-#include "flow/sph/pair_kernels_body.h"
+#include "flow/sph/pair_kernels_internal.h"
 }  // namespace avx2
 #pragma GCC pop_options
 
@@ -183,7 +183,7 @@ INLINE double sum(D8 p) {
   const __m128d two = _mm_add_pd(_mm256_castpd256_pd128(four), _mm256_extractf128_pd(four, 1));
   return _mm_cvtsd_f64(two) + _mm_cvtsd_f64(_mm_unpackhi_pd(two, two));
 }
-#include "flow/sph/pair_kernels_body.h"
+#include "flow/sph/pair_kernels_internal.h"
 }  // namespace avx512
 #pragma GCC pop_options
 #pragma GCC diagnostic pop

@@ -17,46 +17,31 @@ namespace {
 constexpr std::size_t kGrain = 256;  // particles a thread takes at a time
 constexpr Real kExpansion = 0.5;  // step down the scaled gradient; stable below 2 / |A scaled|, which is about 3
 
-
-/// D v; walls at rest when kMoving is false.
-template <bool kMoving>
-void compress(const ParticleSystem& s, const PairKernels& pairs, std::span<const Vec3> v, std::span<Real> out) {
-  parallel_ranges(s.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-    pairs.divergence(begin, end, v, out);
-    for (std::size_t i = begin; i < end; ++i) {
-      for (const Wall& wall : (*s.walls)[i]) {
-        const Vec3 dv = kMoving ? Vec3(v[i] - wall.velocity) : v[i];
-        out[i] += 2 * s.boundary->at(wall.distance).slope * wall.normal.dot(dv);
-      }
-    }
-  });
-}
-
-void accelerate(const ParticleSystem& s, const PairKernels& pairs, std::span<const Real> q, std::span<Vec3> out) {
-  parallel_ranges(s.size(), kGrain, [&](std::size_t begin, std::size_t end) {
-    pairs.gradient(begin, end, q, out);
-    for (std::size_t i = begin; i < end; ++i) {
-      Vec3 sum = -out[i];
-      for (const Wall& wall : (*s.walls)[i]) sum -= 2 * q[i] * s.boundary->at(wall.distance).slope * wall.normal;
-      out[i] = sum;
-    }
-  });
-}
-
 }  // namespace
 
 void compression_rate(const ParticleSystem& s, std::span<const Vec3> v, std::span<Real> out) {
   CHECK_EQ(v.size(), s.size());
   CHECK_EQ(out.size(), s.size());
   const PairsOf pairs(s);
-  compress<true>(s, *pairs.get(), v, out);
+  parallel_ranges(s.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    pairs->divergence(begin, end, v, out);
+    for (std::size_t i = begin; i < end; ++i)
+      for (const Wall& wall : (*s.walls)[i]) out[i] += 2 * s.boundary->at(wall.distance).slope * wall.normal.dot(v[i] - wall.velocity);
+  });
 }
 
 void pressure_acceleration(const ParticleSystem& s, std::span<const Real> q, std::span<Vec3> out) {
   CHECK_EQ(q.size(), s.size());
   CHECK_EQ(out.size(), s.size());
   const PairsOf pairs(s);
-  accelerate(s, *pairs.get(), q, out);
+  parallel_ranges(s.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    pairs->gradient(begin, end, q, out);
+    for (std::size_t i = begin; i < end; ++i) {
+      Vec3 sum = out[i];
+      for (const Wall& wall : (*s.walls)[i]) sum += 2 * q[i] * s.boundary->at(wall.distance).slope * wall.normal;
+      out[i] = -sum;
+    }
+  });
 }
 
 void smooth_linear(const ParticleSystem& s, std::span<const Real> values, std::span<Real> out) {
@@ -92,134 +77,162 @@ PressureResult PressureSolver::solve(const ParticleSystem& s, std::span<const Re
   CHECK_EQ(q.size(), n);
   for (std::vector<Real>* a : {&y_, &low_, &scale_, &g_, &p_, &Ap_, &work_}) a->resize(n);
   a_.resize(n);
+  partial_.resize((n + kGrain - 1) / kGrain);
   PressureResult result;
   if (n == 0) return {0, 0, true};
-
-  // Diagonal of A, by which the unknowns are scaled: q = scale y.
   const PairsOf own(s);
   const PairKernels& pairs = *own.get();
+
+  // f(begin, end) returns a range's share of some sums (and of one minimum).
+  const auto sum_of = [&](auto&& f) {
+    parallel_ranges(n, kGrain, [&](std::size_t begin, std::size_t end) { partial_[begin / kGrain] = f(begin, end); });
+    Sums sum;
+    for (const Sums& part : partial_) sum += part;
+    return sum;
+  };
+
+  // Diagonal of A, by which the unknowns are scaled: q = scale y. And what walls push, once.
+  push_.resize(s.walls->walls.size());
   parallel_for(n, [&](std::size_t i) { work_[i] = s.is_fixed(i) ? 0 : 1; }, 4096);
   parallel_ranges(n, kGrain, [&](std::size_t begin, std::size_t end) {
     pairs.compliance(begin, end, work_, a_, scale_);
     for (std::size_t i = begin; i < end; ++i) {
       Vec3 slope = a_[i];
-      for (const Wall& wall : (*s.walls)[i]) slope += 2 * s.boundary->at(wall.distance).slope * wall.normal;
+      for (Index k = s.walls->first[i]; k < s.walls->first[i + 1]; ++k) {
+        push_[k] = 2 * s.boundary->at(s.walls->walls[k].distance).slope * s.walls->walls[k].normal;
+        slope += push_[k];
+      }
       const Real diagonal = work_[i] * slope.squaredNorm() + scale_[i];
       scale_[i] = diagonal > 0 ? 1 / std::sqrt(diagonal) : 0;
     }
   });
 
-  // y -> scale A scale y
-  const auto multiply = [&](const std::vector<Real>& in, std::vector<Real>& out) {
-    parallel_for(n, [&](std::size_t i) { work_[i] = scale_[i] * in[i]; }, 4096);
-    accelerate(s, pairs, work_, a_);
-    if (!s.fixed.empty()) parallel_for(n, [&](std::size_t i) { if (s.fixed[i]) a_[i].setZero(); }, 4096);
-    compress<false>(s, pairs, a_, out);
-    parallel_for(n, [&](std::size_t i) { out[i] *= -scale_[i]; }, 4096);
+  // a_ = -D^T q, 0 for fixed particles.
+  const auto accelerate = [&](std::span<const Real> of) {
+    parallel_ranges(n, kGrain, [&](std::size_t begin, std::size_t end) {
+      pairs.gradient(begin, end, of, a_);
+      for (std::size_t i = begin; i < end; ++i) {
+        if (s.is_fixed(i)) {
+          a_[i].setZero();
+          continue;
+        }
+        Vec3 sum = a_[i];
+        for (Index k = s.walls->first[i]; k < s.walls->first[i + 1]; ++k) sum += of[i] * push_[k];
+        a_[i] = -sum;
+      }
+    });
   };
-
-  // Of half y A y - b y the gradient at the old pressures is (rate - D v) / dt.
-  compress<true>(s, pairs, v, work_);
-  bool below = false;
-  for (std::size_t i = 0; i < n; ++i) {
-    g_[i] = scale_[i] * (rate[i] - work_[i]) / dt;
-    y_[i] = scale_[i] > 0 ? q[i] / scale_[i] : 0;
-    low_[i] = scale_[i] > 0 ? least[i] / scale_[i] : 0;
-    p_[i] = std::max(low_[i] - y_[i], 0.0);
-    below |= p_[i] > 0;
-  }
-  if (below) {
-    multiply(p_, Ap_);
-    parallel_for(n, [&](std::size_t i) {
-      y_[i] += p_[i];
-      g_[i] += Ap_[i];
-    }, 4096);
-  }
-
+  // Ap = scale A scale p, with work = scale p; returns p . Ap and p . g.
+  const auto multiply = [&] {
+    accelerate(work_);
+    return sum_of([&](std::size_t begin, std::size_t end) {
+      pairs.divergence(begin, end, a_, Ap_);
+      Sums sum;
+      for (std::size_t i = begin; i < end; ++i) {
+        Real rate_i = Ap_[i];
+        for (Index k = s.walls->first[i]; k < s.walls->first[i + 1]; ++k) rate_i += push_[k].dot(a_[i]);
+        Ap_[i] = -scale_[i] * rate_i;
+        sum.first += p_[i] * Ap_[i];
+        sum.second += p_[i] * g_[i];
+      }
+      return sum;
+    });
+  };
+  // p = f(i), work = scale p; returns the longest step along -p that leaves none below its bound.
+  const auto direct = [&](auto&& f) {
+    return sum_of([&](std::size_t begin, std::size_t end) {
+      Sums sum;
+      for (std::size_t i = begin; i < end; ++i) {
+        p_[i] = f(i);
+        work_[i] = scale_[i] * p_[i];
+        if (p_[i] > 0) sum.least = std::min(sum.least, (y_[i] - low_[i]) / p_[i]);
+      }
+      return sum;
+    }).least;
+  };
   // Free gradient: of unknowns off their bound; chopped: of those on it that want off.
   const auto free = [&](std::size_t i) { return y_[i] > low_[i] ? g_[i] : 0.0; };
   const auto chopped = [&](std::size_t i) { return y_[i] > low_[i] ? 0.0 : std::min(g_[i], 0.0); };
-  struct Sums {
-    Real free = 0, chopped = 0, error = 0;
-  };
-  const auto look = [&] {
-    return parallel_reduce(n, Sums{}, [&](std::size_t i) {
-      const Real f = free(i), c = chopped(i), e = scale_[i] > 0 ? dt * dt * (f + c) / scale_[i] : 0;
-      return Sums{f * f, c * c, e * e};
-    }, [](const Sums& a, const Sums& b) { return Sums{a.free + b.free, a.chopped + b.chopped, a.error + b.error}; });
-  };
-  const Real goal = tolerance * tolerance * static_cast<Real>(n);
-  Sums sums = look();
-  parallel_for(n, [&](std::size_t i) { p_[i] = free(i); }, 4096);
-  while (sums.error > goal && result.iterations < max_iterations) {
-    if (sums.chopped <= sums.free) {
-      multiply(p_, Ap_);
-      const auto [pAp, gp] = parallel_reduce(n, std::pair<Real, Real>{0, 0}, [&](std::size_t i) { return std::pair<Real, Real>{p_[i] * Ap_[i], g_[i] * p_[i]}; },
-                                             [](const auto& a, const auto& b) { return std::pair<Real, Real>{a.first + b.first, a.second + b.second}; });
-      if (!(pAp > 0)) break;
-      const Real step = gp / pAp;
-      // The longest step along p that leaves none below its bound.
-      const Real feasible = -parallel_max(n, -std::numeric_limits<Real>::infinity(), [&](std::size_t i) {
-        return p_[i] > 0 ? -(y_[i] - low_[i]) / p_[i] : -std::numeric_limits<Real>::infinity();
-      });
-      if (step <= feasible) {
-        parallel_for(n, [&](std::size_t i) {
-          y_[i] -= step * p_[i];
-          g_[i] -= step * Ap_[i];
-        }, 4096);
-        const Real beta = parallel_sum(n, 0.0, [&](std::size_t i) { return free(i) * Ap_[i]; }) / pAp;
-        parallel_for(n, [&](std::size_t i) { p_[i] = free(i) - beta * p_[i]; }, 4096);
-      } else {
-        // Expansion: to the bound, then a projected step down the gradient.
-        parallel_for(n, [&](std::size_t i) {
-          y_[i] -= feasible * p_[i];
-          g_[i] -= feasible * Ap_[i];
-        }, 4096);
-        parallel_for(n, [&](std::size_t i) {
-          const Real next = std::max(low_[i], y_[i] - kExpansion * free(i));
-          p_[i] = next - y_[i];
-          y_[i] = next;
-        }, 4096);
-        multiply(p_, Ap_);
-        parallel_for(n, [&](std::size_t i) { g_[i] += Ap_[i]; }, 4096);
-        parallel_for(n, [&](std::size_t i) { p_[i] = free(i); }, 4096);
-        ++result.iterations;
-      }
-    } else {
-      // Proportioning: those on the bound that want off leave it.
-      parallel_for(n, [&](std::size_t i) { p_[i] = chopped(i); }, 4096);
-      multiply(p_, Ap_);
-      const Real pAp = parallel_sum(n, 0.0, [&](std::size_t i) { return p_[i] * Ap_[i]; });
-      if (!(pAp > 0)) break;
-      const Real step = sums.chopped / pAp;
-      parallel_for(n, [&](std::size_t i) {
+  // y -= step p, g -= step Ap; returns |free|^2, |chopped|^2, the error squared, and free . Ap.
+  const auto advance = [&](Real step) {
+    return sum_of([&](std::size_t begin, std::size_t end) {
+      Sums sum;
+      for (std::size_t i = begin; i < end; ++i) {
         y_[i] -= step * p_[i];
         g_[i] -= step * Ap_[i];
-      }, 4096);
-      parallel_for(n, [&](std::size_t i) { p_[i] = free(i); }, 4096);
+        const Real f = free(i), c = chopped(i), e = scale_[i] > 0 ? dt * dt * (f + c) / scale_[i] : 0;
+        sum.first += f * f;
+        sum.second += c * c;
+        sum.third += e * e;
+        sum.fourth += f * Ap_[i];
+      }
+      return sum;
+    });
+  };
+
+  // Of half y A y - b y the gradient at the old pressures is (rate - D v) / dt. Pressures below their bound begin there.
+  parallel_ranges(n, kGrain, [&](std::size_t begin, std::size_t end) {
+    pairs.divergence(begin, end, v, Ap_);
+    for (std::size_t i = begin; i < end; ++i) {
+      Real rate_i = Ap_[i];
+      for (Index k = s.walls->first[i]; k < s.walls->first[i + 1]; ++k) rate_i += push_[k].dot(v[i] - s.walls->walls[k].velocity);
+      g_[i] = scale_[i] * (rate[i] - rate_i) / dt;
+      y_[i] = scale_[i] > 0 ? q[i] / scale_[i] : 0;
+      low_[i] = scale_[i] > 0 ? least[i] / scale_[i] : 0;
     }
+  });
+  direct([&](std::size_t i) { return -std::max(low_[i] - y_[i], 0.0); });
+  if (parallel_max(n, 0, [&](std::size_t i) { return -p_[i]; }) > 0) multiply();
+  else std::fill(Ap_.begin(), Ap_.end(), 0.0);
+  Sums sums = advance(1);
+
+  const Real goal = tolerance * tolerance * static_cast<Real>(n);
+  Real feasible = direct(free);
+  while (sums.third > goal && result.iterations < max_iterations) {
     ++result.iterations;
-    sums = look();
+    if (sums.second <= sums.first) {
+      const Sums products = multiply();
+      if (!(products.first > 0)) break;
+      const Real step = products.second / products.first;
+      if (step <= feasible) {
+        sums = advance(step);
+        const Real beta = sums.fourth / products.first;
+        feasible = direct([&](std::size_t i) { return free(i) - beta * p_[i]; });
+        continue;
+      }
+      // Expansion: to the bound, then a projected step down the gradient.
+      advance(feasible);
+      direct([&](std::size_t i) { return y_[i] - std::max(low_[i], y_[i] - kExpansion * free(i)); });
+      multiply();
+      sums = advance(1);
+      ++result.iterations;
+    } else {
+      // Proportioning: those on the bound that want off leave it.
+      direct(chopped);
+      const Sums products = multiply();
+      if (!(products.first > 0)) break;
+      sums = advance(sums.second / products.first);
+    }
+    feasible = direct(free);
   }
-  result.error = std::sqrt(sums.error / static_cast<Real>(n));
-  result.converged = sums.error <= goal;
+  result.error = std::sqrt(sums.third / static_cast<Real>(n));
+  result.converged = sums.third <= goal;
 
   // v += dt a(q_new - q_old)
   parallel_for(n, [&](std::size_t i) {
-    const Real next = scale_[i] > 0 && y_[i] <= low_[i] ? least[i] : scale_[i] * y_[i];  // on the bound to the bit
+    const Real next = scale_[i] * y_[i];
     work_[i] = next - q[i];
     q[i] = next;
   }, 4096);
-  accelerate(s, pairs, work_, a_);
-  parallel_for(n, [&](std::size_t i) {
-    if (!s.is_fixed(i)) v[i] += dt * a_[i];
-  }, 4096);
+  accelerate(work_);
+  parallel_for(n, [&](std::size_t i) { v[i] += dt * a_[i]; }, 4096);
   COUNT("sph.pressure iterations", result.iterations);
   return result;
 }
 
 std::size_t PressureSolver::memory() const {
-  return (y_.capacity() + low_.capacity() + scale_.capacity() + g_.capacity() + p_.capacity() + Ap_.capacity() + work_.capacity()) * sizeof(Real) + a_.capacity() * sizeof(Vec3);
+  return (y_.capacity() + low_.capacity() + scale_.capacity() + g_.capacity() + p_.capacity() + Ap_.capacity() + work_.capacity()) * sizeof(Real) + (a_.capacity() + push_.capacity()) * sizeof(Vec3) +
+         partial_.capacity() * sizeof(Sums);
 }
 
 }  // namespace effuse::flow::sph

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -50,8 +52,20 @@ class PressureSolver {
   std::size_t memory() const;
 
  private:
+  struct Sums {
+    Real first = 0, second = 0, third = 0, fourth = 0, least = std::numeric_limits<Real>::infinity();
+    Sums& operator+=(const Sums& other) {
+      first += other.first;
+      second += other.second;
+      third += other.third;
+      fourth += other.fourth;
+      least = std::min(least, other.least);
+      return *this;
+    }
+  };
   std::vector<Real> y_, low_, scale_, g_, p_, Ap_, work_;
-  std::vector<Vec3> a_;
+  std::vector<Vec3> a_, push_;
+  std::vector<Sums> partial_;
 };
 
 }  // namespace effuse::flow::sph

@@ -1,6 +1,7 @@
 #include "flow/sph/viscosity.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "flow/sph/pair_kernels.h"
@@ -25,18 +26,17 @@ WallDrag wall_drag(const BoundaryTable& table, const Wall& wall, Real slip_lengt
   return {wall.friction * row.drag_t / (d + slip_length), row.drag_n / d};
 }
 
-/// The walls' drag on i at velocity v [N/m^3]; walls at rest for the second.
-Vec3 walls_drag(const ParticleSystem& s, Real mu, Real slip_length, const Vec3& v, std::size_t i, bool moving = true) {
+/// The walls' drag on i at velocity v [N/m^3].
+Vec3 walls_drag(const ParticleSystem& s, Real mu, Real slip_length, const Vec3& v, std::size_t i) {
   Vec3 sum = Vec3::Zero();
   for (const Wall& wall : (*s.walls)[i]) {
     const WallDrag drag = wall_drag(*s.boundary, wall, slip_length, s.spacing);
-    const Vec3 dv = moving ? Vec3(v - wall.velocity) : v;
+    const Vec3 dv = v - wall.velocity;
     const Vec3 across = dv.dot(wall.normal) * wall.normal;
     sum += mu * (drag.along * (dv - across) + drag.across * across);
   }
   return sum;
 }
-Vec3 still_walls_drag(const ParticleSystem& s, Real mu, Real slip_length, const Vec3& v, std::size_t i) { return walls_drag(s, mu, slip_length, v, i, false); }
 
 }  // namespace
 
@@ -63,6 +63,25 @@ void viscous_acceleration(const ParticleSystem& s, Real density, std::span<const
   });
 }
 
+ViscositySolver::Factor::Factor(const Mat3& m) {
+  // m = L L^T, inverted on the way: L^-1 = [a 0 0; b c 0; d e f].
+  const Real l00 = std::sqrt(m(0, 0)), l10 = m(1, 0) / l00, l20 = m(2, 0) / l00;
+  const Real l11 = std::sqrt(m(1, 1) - l10 * l10), l21 = (m(2, 1) - l20 * l10) / l11;
+  const Real l22 = std::sqrt(m(2, 2) - l20 * l20 - l21 * l21);
+  const Real b_ = -l10 / (l00 * l11), e_ = -l21 / (l11 * l22);
+  a = static_cast<float>(1 / l00);
+  b = static_cast<float>(b_);
+  c = static_cast<float>(1 / l11);
+  d = static_cast<float>(-(l20 / l00 + l21 * b_) / l22);
+  e = static_cast<float>(e_);
+  f = static_cast<float>(1 / l22);
+}
+
+Vec3 ViscositySolver::Factor::solve(const Vec3& r) const {
+  const Real y0 = a * r.x(), y1 = b * r.x() + c * r.y(), y2 = d * r.x() + e * r.y() + f * r.z();
+  return {a * y0 + b * y1 + d * y2, c * y1 + e * y2, f * y2};
+}
+
 ViscosityResult ViscositySolver::solve(const ParticleSystem& s, Real density, std::span<const Real> mu, Real slip_length, Real dt, std::span<const Vec3> v0, Real tolerance,
                                        int max_iterations, std::span<Vec3> v) {
   ZONE("sph.viscosity");
@@ -71,79 +90,111 @@ ViscosityResult ViscositySolver::solve(const ParticleSystem& s, Real density, st
   CHECK_EQ(v0.size(), n);
   CHECK_EQ(v.size(), n);
   r_.resize(n);
-  z_.resize(n);
   p_.resize(n);
   Ap_.resize(n);
   inverse_.resize(n);
-  const Real factor = dt / density;
+  drag_.resize(s.walls->walls.size());
   const PairsOf pairs(s);
   pairs->set_viscosity(mu);
+  const Real factor = dt / density;
   ViscosityResult result;
 
-  // Diagonal blocks, and the right-hand side: what moving walls drag along is known.
-  parallel_ranges(n, kGrain, [&](std::size_t begin, std::size_t end) {
-    Mat3 block[kGrain];
-    pairs->viscous_block(begin, end, std::span(block, end - begin));
-    for (std::size_t i = begin; i < end; ++i) {
-      Mat3 sum = Mat3::Identity() + factor * block[i - begin];
-      r_[i] = v0[i];
-      for (const Wall& wall : (*s.walls)[i]) {
-        const WallDrag drag = wall_drag(*s.boundary, wall, slip_length, s.spacing);
-        const Mat3 across = wall.normal * wall.normal.transpose();
-        const Mat3 matrix = factor * mu[i] * (drag.along * (Mat3::Identity() - across) + drag.across * across);
-        sum += matrix;
-        r_[i] += matrix * wall.velocity;
-      }
-      inverse_[i] = sum.inverse();
-    }
-  });
-  const auto multiply = [&](std::span<const Vec3> in, std::span<Vec3> out) {
-    parallel_ranges(n, kGrain, [&](std::size_t begin, std::size_t end) {
-      pairs->viscous(begin, end, in, out);
-      for (std::size_t i = begin; i < end; ++i) {
-        if (s.is_fixed(i)) out[i].setZero();
-        else out[i] = in[i] + factor * (out[i] + still_walls_drag(s, mu[i], slip_length, in[i], i));
-      }
-    });
-  };
-  const auto dot = [&](const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
-    return parallel_sum(n, 0.0, [&](std::size_t i) { return a[i].dot(b[i]); });
+  // f(begin, end) returns a range's share of two sums.
+  partial_.resize((n + kGrain - 1) / kGrain);
+  const auto sum_of = [&](auto&& f) {
+    parallel_ranges(n, kGrain, [&](std::size_t begin, std::size_t end) { partial_[begin / kGrain] = f(begin, end); });
+    Sums sum;
+    for (const Sums& part : partial_) sum += part;
+    return sum;
   };
 
-  // The norm of the right-hand side counts; of fixed particles nothing is asked.
-  const Real b2 = parallel_sum(n, 0.0, [&](std::size_t i) { return s.is_fixed(i) ? 0.0 : r_[i].dot(inverse_[i] * r_[i]); });
+  // Diagonal blocks, and the right-hand side: what moving walls drag along is known. The norm of the right-hand side
+  // counts; of fixed particles nothing is asked.
+  const Sums b2 = sum_of([&](std::size_t begin, std::size_t end) {
+    std::array<Mat3, kGrain> block;
+    pairs->viscous_block(begin, end, std::span(block).first(end - begin));
+    Sums sum;
+    for (std::size_t i = begin; i < end; ++i) {
+      Mat3 m = Mat3::Identity() + factor * block[i - begin];
+      Vec3 b = v0[i];
+      for (Index k = s.walls->first[i]; k < s.walls->first[i + 1]; ++k) {
+        const Wall& wall = s.walls->walls[k];
+        const WallDrag drag = wall_drag(*s.boundary, wall, slip_length, s.spacing);
+        drag_[k] = {factor * mu[i] * drag.along, factor * mu[i] * drag.across};
+        const Mat3 across = wall.normal * wall.normal.transpose();
+        const Mat3 matrix = drag_[k].along * (Mat3::Identity() - across) + drag_[k].across * across;
+        m += matrix;
+        b += matrix * wall.velocity;
+      }
+      inverse_[i] = Factor(m);
+      r_[i] = b;
+      if (!s.is_fixed(i)) sum += {b.dot(inverse_[i].solve(b)), b.squaredNorm()};
+    }
+    return sum;
+  });
+
+  // out = A in; returns in . out.
+  const auto multiply = [&](std::span<const Vec3> in, std::span<Vec3> out) {
+    return sum_of([&](std::size_t begin, std::size_t end) {
+      pairs->viscous(begin, end, in, out);
+      Sums sum;
+      for (std::size_t i = begin; i < end; ++i) {
+        if (s.is_fixed(i)) {
+          out[i].setZero();
+          continue;
+        }
+        Vec3 a = in[i] + factor * out[i];
+        for (Index k = s.walls->first[i]; k < s.walls->first[i + 1]; ++k) {
+          const Vec3& normal = s.walls->walls[k].normal;
+          const Vec3 across = in[i].dot(normal) * normal;
+          a += drag_[k].along * (in[i] - across) + drag_[k].across * across;
+        }
+        out[i] = a;
+        sum += {in[i].dot(a), 0};
+      }
+      return sum;
+    });
+  };
+
   multiply(v, Ap_);
-  parallel_for(n, [&](std::size_t i) {
-    r_[i] = s.is_fixed(i) ? Vec3(Vec3::Zero()) : Vec3(r_[i] - Ap_[i]);
-    z_[i] = inverse_[i] * r_[i];
-    p_[i] = z_[i];
-  }, 2048);
-  Real rz = dot(r_, z_);
-  const Real goal = tolerance * tolerance * b2;
-  while (rz > goal && result.iterations < max_iterations) {
-    multiply(p_, Ap_);
-    const Real pAp = dot(p_, Ap_);
+  Sums rr = sum_of([&](std::size_t begin, std::size_t end) {
+    Sums sum;
+    for (std::size_t i = begin; i < end; ++i) {
+      r_[i] = s.is_fixed(i) ? Vec3(Vec3::Zero()) : Vec3(r_[i] - Ap_[i]);
+      p_[i] = inverse_[i].solve(r_[i]);
+      sum += {r_[i].dot(p_[i]), r_[i].squaredNorm()};
+    }
+    return sum;
+  });
+  const Real goal = tolerance * tolerance;
+  const auto reached = [&] { return rr.preconditioned <= goal * b2.preconditioned && rr.plain <= goal * b2.plain; };
+  while (!reached() && result.iterations < max_iterations) {
+    const Real pAp = multiply(p_, Ap_).preconditioned;
     if (!(pAp > 0)) break;  // not a number, or rounding has the last word
-    const Real alpha = rz / pAp;
-    parallel_for(n, [&](std::size_t i) {
-      v[i] += alpha * p_[i];
-      r_[i] -= alpha * Ap_[i];
-      z_[i] = inverse_[i] * r_[i];
-    }, 2048);
-    const Real next = dot(r_, z_);
-    const Real beta = next / rz;
-    rz = next;
-    parallel_for(n, [&](std::size_t i) { p_[i] = z_[i] + beta * p_[i]; }, 2048);
+    const Real alpha = rr.preconditioned / pAp;
+    const Sums next = sum_of([&](std::size_t begin, std::size_t end) {
+      Sums sum;
+      for (std::size_t i = begin; i < end; ++i) {
+        v[i] += alpha * p_[i];
+        r_[i] -= alpha * Ap_[i];
+        sum += {r_[i].dot(inverse_[i].solve(r_[i])), r_[i].squaredNorm()};
+      }
+      return sum;
+    });
+    const Real beta = next.preconditioned / rr.preconditioned;
+    rr = next;
+    parallel_for(n, [&](std::size_t i) { p_[i] = inverse_[i].solve(r_[i]) + beta * p_[i]; }, 2048);
     ++result.iterations;
   }
-  result.residual = b2 > 0 ? std::sqrt(std::max(rz, 0.0) / b2) : 0;
-  result.converged = rz <= goal;
+  result.residual = b2.plain > 0 ? std::sqrt(std::max(rr.preconditioned / b2.preconditioned, rr.plain / b2.plain)) : 0;
+  result.converged = reached();
   COUNT("sph.viscosity iterations", result.iterations);
   return result;
 }
 
 std::size_t ViscositySolver::memory() const {
-  return (r_.capacity() + z_.capacity() + p_.capacity() + Ap_.capacity()) * sizeof(Vec3) + inverse_.capacity() * sizeof(Mat3);
+  return (r_.capacity() + p_.capacity() + Ap_.capacity()) * sizeof(Vec3) + inverse_.capacity() * sizeof(Factor) + drag_.capacity() * sizeof(Drag) +
+         partial_.capacity() * sizeof(Sums);
 }
 
 }  // namespace effuse::flow::sph

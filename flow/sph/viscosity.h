@@ -14,9 +14,8 @@ namespace effuse::flow::sph {
 /// with w of ViscousWeight: a force along the line between two particles, equal and opposite: linear and angular
 /// momentum are kept to rounding, a rigid rotation feels nothing. In the continuum nu (lap v + 2 grad div v), stress
 /// mu (grad v + grad v^T + I div v). The wall's half-space moves on linearly through zero at slip_length [m] behind
-/// its surface, viscosity mu_i; see BoundaryTable. Error of the vector for shear in any direction, rms, on a cubic lattice /
-/// with 10 % jitter: 17 % / 26 % at a support of 2 spacings, 5 % / 11 % at 2.6, 1.2 % / 6 % at 3; of the part along it alone
-/// 12 % / 17 %, 3 % / 7 %, 1 % / 3 %.
+/// its surface, viscosity mu_i; see BoundaryTable. Error for shear in any direction, on a cubic lattice / with 10 %
+/// jitter (rms): 11 % / 25 % at a support of 2 spacings, 3 % / 11 % at 2.6, 1 % / 5 % at 3.
 /// After Weiler, Koschier, Brand & Bender 2018, Comput. Graph. Forum 37(2), whose weight 10 F / (r^2 + 0.01 h^2) leaves
 /// 20 % / 48 % at 2 spacings and 3 % / 10 % at 3.
 ///
@@ -28,7 +27,7 @@ Real wall_dissipation(const ParticleSystem& system, Real mu, Real slip_length, c
 
 struct ViscosityResult {
   int iterations = 0;
-  Real residual = 0;  ///< |r| / |b|, reached
+  Real residual = 0;  ///< |r| / |b|, reached, the larger of both norms
   bool converged = false;
 };
 
@@ -37,14 +36,36 @@ struct ViscosityResult {
 class ViscositySolver {
  public:
   /// v: in: first guess (velocities of fixed particles: prescribed, kept); out: solution.
-  /// Stops at |r| <= tolerance |b| with b = v0 + the moving walls' drag, in the norm of the preconditioner.
+  /// Stops at |r| <= tolerance |b| with b = v0 + the moving walls' drag, in the preconditioner's norm and in the plain
+  /// one: what momentum goes astray is the sum of r, and stiff particles hardly count in the first.
   ViscosityResult solve(const ParticleSystem& system, Real density, std::span<const Real> mu, Real slip_length, Real dt, std::span<const Vec3> v0, Real tolerance,
                         int max_iterations, std::span<Vec3> v);
   std::size_t memory() const;
 
  private:
-  std::vector<Vec3> r_, z_, p_, Ap_;
-  std::vector<Mat3> inverse_;
+  /// L^-1 of a block's Cholesky factor, lower triangle by rows: z = L^-T L^-1 r. Floats: as a preconditioner it stays
+  /// symmetric and positive definite, however they round.
+  struct Factor {
+    float a, b, c, d, e, f;
+    explicit Factor(const Mat3& block = Mat3::Identity());
+    Vec3 solve(const Vec3& r) const;
+  };
+  struct Drag {
+    Real along, across;  // of a wall, times dt mu / rho
+  };
+  /// r . M^-1 r and r . r, or the like.
+  struct Sums {
+    Real preconditioned = 0, plain = 0;
+    Sums& operator+=(const Sums& other) {
+      preconditioned += other.preconditioned;
+      plain += other.plain;
+      return *this;
+    }
+  };
+  std::vector<Vec3> r_, p_, Ap_;
+  std::vector<Factor> inverse_;
+  std::vector<Drag> drag_;
+  std::vector<Sums> partial_;
 };
 
 }  // namespace effuse::flow::sph

@@ -1,9 +1,12 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
+#include <string_view>
 
 #include "flow/effects/registry.h"
 #include "geometry/base/log.h"
+#include "importers/scene/scene_file.h"
 #include "samples/effuse/commands.h"
 #include "samples/effuse/load_scene.h"
 
@@ -71,27 +74,87 @@ ExitCode check(const CheckCommand& command, const CommonOptions& common) {
   return ExitCode::kDone;
 }
 
+namespace {
+
+/// A parameter of an effect, and the choices that make the effect read it: "model = classic". None: it always does.
+struct Listed {
+  flow::ParameterDoc doc;
+  std::string with;
+};
+
+/// What an effect reads is what it can be told: ask it to read a table that holds one of each list, and set `choices`.
+std::vector<flow::ParameterDoc> read_docs(const flow::EffectKind& kind, const std::vector<std::string>& choices) {
+  flow::Node root;
+  flow::Node list;
+  list.kind = flow::Node::Kind::kArray;
+  list.items.emplace_back();
+  root.set(kind.name, flow::Node{}).set("vent", list);
+  for (const std::string& choice : choices) importers::apply_override(root, choice);
+  flow::Parameters parameters(root);
+  flow::Parameters effect = parameters.table(kind.name, kind.what);
+  kind.read(effect, 1);
+  return parameters.docs();
+}
+
+/// The names of a choice; none of anything else.
+std::vector<std::string> names_of(const flow::ParameterDoc& doc) {
+  std::vector<std::string> names;
+  constexpr std::string_view kHead = "choice: ", kBetween = " | ";
+  if (!doc.unit.starts_with(kHead) || doc.path.find('[') != std::string::npos) return names;
+  std::string_view rest = std::string_view(doc.unit).substr(kHead.size());
+  for (std::size_t end = 0; end != std::string_view::npos; rest.remove_prefix(std::min(rest.size(), end + kBetween.size()))) {
+    end = rest.find(kBetween);
+    names.emplace_back(rest.substr(0, end));
+  }
+  return names;
+}
+
+/// All parameters there are: those of the defaults first, then those that each other choice brings, a choice within a
+/// choice too; the last choices first, so that a law's parameters are told with the law, not with a preset that has it.
+std::vector<Listed> list_parameters(const flow::EffectKind& kind) {
+  std::vector<Listed> all;
+  const auto explore = [&](const auto& self, const std::vector<std::string>& choices) -> void {
+    const std::size_t first = all.size();
+    for (flow::ParameterDoc& doc : read_docs(kind, choices)) {
+      const bool known = std::any_of(all.begin(), all.end(), [&](const Listed& l) { return l.doc.path == doc.path; });
+      if (known) continue;
+      std::string with;
+      for (const std::string& choice : choices) with += (with.empty() ? "" : ", ") + choice.substr(kind.name.size() + 1);
+      all.push_back({std::move(doc), std::move(with)});
+    }
+    const std::size_t last = all.size();
+    for (std::size_t k = last; k-- > first;) {
+      const flow::ParameterDoc doc = all[k].doc;
+      for (const std::string& name : names_of(doc)) {
+        if (name == doc.default_value) continue;
+        std::vector<std::string> more = choices;
+        more.push_back(doc.path + "=" + name);
+        self(self, more);
+      }
+    }
+  };
+  explore(explore, {});
+  return all;
+}
+
+}  // namespace
+
 ExitCode effects(const CommonOptions& common) {
   nlohmann::ordered_json j = nlohmann::ordered_json::array();
   for (const flow::EffectKind& kind : flow::effect_kinds()) {
-    // What an effect reads is what it can be told: ask it to read a table that holds one of each list.
-    flow::Node root;
-    flow::Node list;
-    list.kind = flow::Node::Kind::kArray;
-    list.items.emplace_back();
-    flow::Node& table = root.set(kind.name, flow::Node{});
-    table.set("vent", list);
-    flow::Parameters parameters(root);
-    flow::Parameters effect = parameters.table(kind.name, kind.what);
-    kind.read(effect, 1);
     nlohmann::ordered_json entries = nlohmann::ordered_json::array();
     if (!common.json) fmt::print("[{}]  {}\n", kind.name, kind.what);
-    for (const flow::ParameterDoc& doc : parameters.docs()) {
+    std::string with;
+    for (const Listed& listed : list_parameters(kind)) {
+      const flow::ParameterDoc& doc = listed.doc;
       if (common.json) {
         entries.push_back({{"path", doc.path}, {"unit", doc.unit}, {"default", doc.default_value}, {"what", doc.what}});
-      } else {
-        fmt::print("  {:<32} {:<18} {:<18} {}\n", doc.path, doc.unit, doc.default_value.empty() ? "(required)" : doc.default_value, doc.what);
+        if (!listed.with.empty()) entries.back()["with"] = listed.with;
+        continue;
       }
+      if (listed.with != with) fmt::print(" with {}:\n", listed.with);
+      with = listed.with;
+      fmt::print("  {:<32} {:<18} {:<18} {}\n", doc.path, doc.unit, doc.default_value.empty() ? "(required)" : doc.default_value, doc.what);
     }
     j.push_back({{"name", kind.name}, {"what", kind.what}, {"parameters", entries}});
   }

@@ -114,7 +114,7 @@ void expect_rest(Real jitter, Real settle, Real until) {
   EXPECT_LT(worst, 1.2 * dx) << "no particle's is off by much more than a layer";
 }
 
-TEST(ModernLava, ALayerOnALatticeRestsForTenSecondsUnderItsPressure) { expect_rest(0, 0, 10); }
+TEST(ModernLava, ALayerOnALatticeRestsForTenSecondsUnderItsPressure) { expect_rest(0, 2, 12); }
 TEST(ModernLavaSlow, ADisorderedLayerSettlesAndRestsForTenSecondsUnderItsPressure) { expect_rest(0.1, 5, 15); }
 
 TEST(ModernLavaSlow, ABoxFullRestsForTenSeconds) {
@@ -222,11 +222,14 @@ TEST(ModernLava, ADropFallsFreelyAndLands) {
     t += dt;
     vz -= kGravity * dt;
     z += vz * dt;
-    for (const Vec3& v : lava.velocities()) EXPECT_LT((v - Vec3(0.3, 0, vz)).norm(), 1e-9) << "no force but gravity";
+    Real worst = 0;
+    for (const Vec3& v : lava.velocities()) worst = std::max(worst, (v - Vec3(0.3, 0, vz)).norm());
+    // Momentum is kept to the viscosity solve's tolerance.
+    EXPECT_LT(worst, 10 * o.viscosity_tolerance * std::hypot(0.3, vz)) << "no force but gravity";
   }
-  EXPECT_NEAR(mean(lava.positions()).z(), z, 1e-9);
+  EXPECT_NEAR(mean(lava.positions()).z(), z, 1e-3 * 1.2);
   EXPECT_NEAR(z, start.z() - kGravity * t * t / 2, kGravity * t * 0.01);
-  EXPECT_NEAR(mean(lava.positions()).x(), start.x() + 0.3 * t, 1e-9);
+  EXPECT_NEAR(mean(lava.positions()).x(), start.x() + 0.3 * t, 1e-4);
   while (lava.time() < 4) lava.step(0.01);
   Real lowest = 1e9, highest = 0;
   for (const Vec3& p : lava.positions()) {
@@ -254,7 +257,7 @@ TEST(ModernLava, HeavyOverlapAtTheStartDoesNotExplode) {
   }
   EXPECT_TRUE(finite(lava));
   EXPECT_LT(speed, 2 * std::sqrt(2 * kGravity * 0.6)) << "twice what falling from its height gives";
-  EXPECT_LT(error, 0.01);
+  EXPECT_LT(error, 0.03) << "of 3 at the start";
 }
 
 class Extremes : public testing::TestWithParam<Real> {};
@@ -299,7 +302,9 @@ TEST(ModernLava, ColdLavaBesideHotLavaIsCarriedWithoutBreakingAnything) {
   while (lava.time() < 0.2) lava.step(0.02);
   EXPECT_TRUE(finite(lava));
   EXPECT_LT((mean(lava.velocities()) - start - lava.time() * o.gravity).norm(), 10 * 1e-3 * most) << "ten steps";
-  for (const Vec3& u : lava.velocities()) EXPECT_LT((u - lava.time() * o.gravity).norm(), 1.05 * most);
+  Real fast = 0;
+  for (const Vec3& u : lava.velocities()) fast = std::max(fast, (u - lava.time() * o.gravity).norm());
+  EXPECT_LT(fast, 1.05 * most) << "seen by somebody who falls along";
 }
 
 TEST(ModernLava, CreepIsAsSlowAsItsViscosity) {
@@ -310,7 +315,7 @@ TEST(ModernLava, CreepIsAsSlowAsItsViscosity) {
     ModernOptions o = isothermal(0.2, mu);
     o.rheology.mu_max = 1e13;
     o.gravity = kGravity * Vec3(std::sin(0.1), 0, -std::cos(0.1));
-    o.period = Vec2(1.2, 1.2);
+    o.period = Vec2(6 * o.spacing, 6 * o.spacing);
     o.max_step = 1e5;
     ModernLava lava(o, {}, {floor_at()});
     fill(lava, lattice_block(6, 6, 5, 0.2));
@@ -331,7 +336,7 @@ TEST(ModernLava, APistonPushesAndABeltDragsLavaAlong) {
     plane(Vec3(*place, 0, 0), Vec3::UnitX(), speed, 1)(x, reach, out);
   };
   ModernOptions o = isothermal(0.1, 100);
-  o.period = Vec2(0, 0.6);
+  o.period = Vec2(0, 6 * o.spacing);
   o.max_step = 0.02;
   ModernLava lava(o, {}, {floor_at(), piston});
   fill(lava, lattice_block(10, 6, 4, 0.1));
@@ -354,7 +359,7 @@ TEST(ModernLava, FreeSlipGroundLetsAFilmFallLikeABlock) {
   ModernOptions o = isothermal(0.1, 1e4);
   o.slip_length = std::numeric_limits<Real>::infinity();
   o.gravity = Vec3(1, 0, -9);
-  o.period = Vec2(0.6, 0.6);
+  o.period = Vec2(6 * o.spacing, 6 * o.spacing);
   o.courant = 100;
   ModernLava lava(o, {}, {floor_at()});
   fill(lava, lattice_block(6, 6, 4, 0.1));
@@ -425,7 +430,7 @@ ModernLava everything() {
   o.rheology.melt = exponential_melt(1200 + kZeroCelsius, 1e3, 1000 + kZeroCelsius, 1e6);
   o.crust_viscosity = 1e6;
   o.crust_strength = 1e4;
-  o.sleep_speed = 0.02;
+  o.sleep_speed = 0.05;
   o.sleep_delay = 0.5;
   o.rest_period = 1;
   Vent first = crater(0.4, 0.8), second = crater(0.2, 0.4, Vec3(2, 0, -0.2));
@@ -511,9 +516,7 @@ TEST(ModernLavaDeathTest, RefusesWhatIsNotFinite) {
   EXPECT_DEATH(fill(lava, {Vec3::Zero()}, Vec3(0, std::numeric_limits<Real>::infinity(), 0)), "CHECK");
   EXPECT_DEATH(fill(lava, {Vec3::Zero()}, Vec3::Zero(), nan), "CHECK");
   EXPECT_DEATH(lava.step(0), "CHECK");
-  ModernOptions o = isothermal(0, 10);
-  EXPECT_DEATH(ModernLava(o, {}, {}), "CHECK");
-  o = isothermal(1, 10);
+  ModernOptions o = isothermal(1, 10);
   o.period = Vec2(3, 0);
   EXPECT_DEATH(ModernLava(o, {}, {}), "CHECK") << "shorter than two supports";
 }
@@ -526,102 +529,138 @@ TEST(ModernLava, WithoutParticlesStepsAreTimeThatPasses) {
 
 // ---- sleep ----
 
-ModernOptions sleepy(Real mu = 1e5) {
-  ModernOptions o = isothermal(0.2, mu);
-  o.sleep_speed = 1e-3;
+/// Lava with a yield strength: a cake of it on level ground comes to rest. Stiff (1e8 Pa s) as long as it is not pushed.
+ModernOptions sleepy() {
+  ModernOptions o = isothermal(0.2, 1e4);
+  o.rheology.yield.kind = YieldKind::kConstant;
+  o.rheology.yield.tau = 4000;
+  o.rheology.mu_max = 1e8;
+  o.sleep_speed = 2e-3;
   o.sleep_delay = 2;
-  o.max_step = 0.5;
+  o.max_step = 0.25;
   return o;
 }
-
-/// A flat cake at rest on a floor, in a box so that it stays, asleep.
-ModernLava sleeping(std::vector<Vent> vents = {}, Real width = 4) {
-  ModernLava lava(sleepy(), std::move(vents), box(width, 1.2));
-  fill(lava, lattice_block(static_cast<int>(std::lround(width / 0.2)), 6, 3, 0.2));
+ModernLava cake(int length, std::vector<Vent> vents = {}) {
+  ModernLava lava(sleepy(), std::move(vents), {floor_at()});
+  fill(lava, lattice_block(length, 6, 3, 0.2));
   return lava;
+}
+void let_sleep(ModernLava& lava) {
+  while (sleepers(lava) < lava.size() && lava.time() < 100) lava.step(0.5);
+  ASSERT_EQ(sleepers(lava), lava.size()) << "fastest " << fastest(lava) << " m/s";
 }
 
 TEST(ModernLava, AFlowThatHasStoppedFallsAsleepAndCostsNothing) {
-  ModernLava lava = sleeping();
-  ModernReport report;
-  int steps = 0;
-  do report = lava.step(0.5);
-  while (report.awake > 0 && ++steps < 200);
-  EXPECT_LT(steps, 200) << report.awake << " still awake at " << lava.time() << " s";
-  EXPECT_EQ(sleepers(lava), lava.size());
+  ModernLava lava = cake(12);
+  let_sleep(lava);
   const std::vector<Vec3> x(lava.positions().begin(), lava.positions().end());
-  for (int step = 0; step < 20; ++step) report = lava.step(0.5);
-  EXPECT_EQ(report.awake, 0u);
-  EXPECT_EQ(report.neighbor_pairs, 0u);
-  EXPECT_EQ(report.pressure_iterations + report.viscosity_iterations, 0);
-  EXPECT_TRUE(std::equal(x.begin(), x.end(), lava.positions().begin(), lava.positions().end())) << "nobody has moved";
+  ModernReport report;
+  for (int step = 0; step < 20; ++step) {
+    report = lava.step(0.5);
+    EXPECT_EQ(report.awake, 0u);
+    EXPECT_EQ(report.neighbor_pairs, 0u);
+    EXPECT_EQ(report.pressure_iterations + report.viscosity_iterations + report.density_iterations, 0);
+  }
   EXPECT_EQ(fastest(lava), 0);
+  // Memory order may change, nobody's place does.
+  Vec3 drift = mean(lava.positions()) - mean(x);
+  EXPECT_LT(drift.norm(), 1e-12);
+  EXPECT_EQ(sleepers(lava), lava.size());
 }
 
 TEST(ModernLava, ANewVentWakesWhatItTouchesAndNothingFarAway) {
-  Vent vent = crater(0.02, 0.4, Vec3(0.6, 0.6, 0));
+  Vent vent = crater(0.05, 0.4, Vec3(0.6, 0.6, 0));
   vent.start = 100;
-  ModernLava lava = sleeping({vent}, 8);
-  while (lava.time() < 99.5) lava.step(0.5);
-  ASSERT_EQ(sleepers(lava), lava.size());
-  std::size_t awake = 0;
-  while (lava.time() < 112) awake = std::max(awake, lava.step(0.5).awake);
-  EXPECT_GT(awake, 8u) << "the vent's own and some that slept";
+  ModernLava lava = cake(40, {vent});
+  const std::size_t old = lava.size();
+  let_sleep(lava);
+  while (lava.time() < 99.9) lava.step(100 - lava.time());
   std::size_t woken = 0, far = 0;
-  for (std::size_t i = 0; i < lava.size(); ++i) {
-    if (lava.ids()[i] >= 40 * 6 * 3 || lava.asleep()[i]) continue;
-    ++woken;
-    far += lava.positions()[i].x() > 6;
+  while (lava.time() < 106) {
+    lava.step(0.25);
+    std::size_t now = 0;
+    for (std::size_t i = 0; i < lava.size(); ++i) {
+      if (lava.ids()[i] >= old || lava.asleep()[i]) continue;
+      ++now;
+      far += lava.positions()[i].x() > 6;
+    }
+    woken = std::max(woken, now);
   }
-  EXPECT_GT(woken, 0u);
+  EXPECT_GT(lava.size(), old + 20);
+  EXPECT_GT(woken, 10u);
   EXPECT_EQ(far, 0u);
   EXPECT_TRUE(finite(lava));
 }
 
-TEST(ModernLava, APushWakesSleepersAndTheyMove) {
-  ModernLava lava(sleepy(), {}, {floor_at()});
-  std::vector<Vec3> cake = lattice_block(12, 6, 2, 0.2);
-  fill(lava, cake);
-  while (sleepers(lava) < lava.size() && lava.time() < 400) lava.step(0.5);
-  ASSERT_EQ(sleepers(lava), lava.size());
-  const Real before = mean(lava.positions()).x();
-  const std::size_t sleepers_before = sleepers(lava);
-  // A block flies in from the side.
-  fill(lava, lattice_block(4, 6, 2, 0.2), Vec3(-1.2, 0, 0), Vec3(3, 0, 0), 1400);
-  std::size_t fewest = sleepers_before;
+TEST(ModernLava, ALoadWakesSleepersAndTheyMoveAndSettleAgain) {
+  ModernLava lava = cake(12);
+  let_sleep(lava);
+  const std::size_t old = lava.size();
+  const auto mean_x = [&] {
+    Real sum = 0;
+    for (std::size_t i = 0; i < lava.size(); ++i)
+      if (lava.ids()[i] < old) sum += lava.positions()[i].x();
+    return sum / static_cast<Real>(old);
+  };
+  const Real before = mean_x();
+  // A pile three times as high is set down beside it.
+  fill(lava, lattice_block(5, 6, 9, 0.2), Vec3(-1.1, 0, 0), Vec3::Zero(), 1400);
+  std::size_t fewest = old;
   const Real t = lava.time();
-  while (lava.time() < t + 1) {
-    lava.step(0.05);
-    fewest = std::min(fewest, sleepers(lava));
+  while (lava.time() < t + 20) {
+    lava.step(0.25);
+    std::size_t asleep = 0;
+    for (std::size_t i = 0; i < lava.size(); ++i) asleep += lava.ids()[i] < old && lava.asleep()[i];
+    fewest = std::min(fewest, asleep);
   }
-  EXPECT_LT(fewest, sleepers_before);
-  Real after = 0;
-  int n = 0;
-  for (std::size_t i = 0; i < lava.size(); ++i)
-    if (lava.ids()[i] < cake.size()) {
-      after += lava.positions()[i].x();
-      ++n;
-    }
-  EXPECT_GT(after / n, before + 1e-4);
+  EXPECT_LT(fewest, old - 20);
+  EXPECT_GT(mean_x(), before + 0.01);
+}
+
+TEST(ModernLava, AMovingWallWakesTheSleepersItRunsInto) {
+  auto place = std::make_shared<Real>(-5);
+  auto speed = std::make_shared<Real>(0);
+  const ContactSource piston = [place, speed](std::span<const Vec3> x, Real reach, std::span<geometry::Contact> out) {
+    plane(Vec3(*place, 0, 0), Vec3::UnitX(), Vec3(*speed, 0, 0), 1)(x, reach, out);
+  };
+  ModernLava lava(sleepy(), {}, {floor_at(), piston});
+  fill(lava, lattice_block(12, 6, 3, 0.2));
+  let_sleep(lava);
+  Real left = 1e9;
+  for (const Vec3& x : lava.positions()) left = std::min(left, x.x());
+  *place = left - 0.5;
+  *speed = 0.1;
+  for (int step = 0; step < 60; ++step) {
+    lava.step(0.2);
+    *place += 0.2 * *speed;
+  }
+  EXPECT_LT(sleepers(lava), lava.size());
+  std::size_t behind = 0;
+  for (const Vec3& x : lava.positions()) behind += x.x() < *place - 0.02;
+  EXPECT_EQ(behind, 0u) << "the wall went through";
 }
 
 TEST(ModernLava, LavaFlowsOverSleepersWithoutSinkingIn) {
-  ModernLava lava = sleeping();
-  while (sleepers(lava) < lava.size() && lava.time() < 400) lava.step(0.5);
-  ASSERT_EQ(sleepers(lava), lava.size());
-  const std::size_t cake = lava.size();
-  fill(lava, lattice_block(4, 4, 2, 0.2), Vec3(1.6, 0.2, 0.65), Vec3::Zero(), 1400);
+  ModernLava lava = cake(16);
+  let_sleep(lava);
+  const std::size_t old = lava.size();
+  Real top = 0;
+  for (const Vec3& x : lava.positions()) top = std::max(top, x.z());
+  fill(lava, lattice_block(4, 4, 2, 0.2), Vec3(1.2, 0.2, top + 0.1), Vec3::Zero(), 1400);
   const Real t = lava.time();
-  while (lava.time() < t + 60) lava.step(0.2);
-  EXPECT_TRUE(finite(lava));
-  // Density tells what has sunk in; and the newcomers lie on top of where the cake was.
-  Real densest = 0, lowest = 1e9;
-  for (std::size_t i = 0; i < lava.size(); ++i) {
-    if (!lava.asleep()[i]) densest = std::max(densest, lava.densities()[i]);
-    if (lava.ids()[i] >= cake) lowest = std::min(lowest, lava.positions()[i].z());
+  Real densest = 0;
+  while (lava.time() < t + 20) {
+    lava.step(0.25);
+    if (lava.time() > t + 5)
+      for (std::size_t i = 0; i < lava.size(); ++i)
+        if (!lava.asleep()[i]) densest = std::max(densest, lava.densities()[i]);
   }
+  EXPECT_TRUE(finite(lava));
+  Real lowest = 1e9;
+  for (std::size_t i = 0; i < lava.size(); ++i)
+    if (lava.ids()[i] >= old) lowest = std::min(lowest, lava.positions()[i].z());
   EXPECT_LT(densest, 1.1);
-  EXPECT_GT(lowest, 0.35) << "cake 0.6 m deep; a newcomer may press a spacing in";
+  EXPECT_GT(lowest, top - 0.15) << "not into the upper layer";
 }
 
 TEST(ModernLava, ViewsAreOfOneSizeAndPointsAreTheSkins) {
