@@ -20,7 +20,7 @@ namespace effuse::flow {
 ///   steps smallest_step_s retries
 ///   awake*                                     particles whose motion the last step computed
 ///   pressure_iterations viscosity_iterations density_iterations   mean a step
-///   density_error                              largest, rms over particles of what is compressed: share
+///   density_error* largest_density_error       rms over particles of what is compressed: share
 ///   max_speed_m_s* min_temperature_K* mean_temperature_K* max_temperature_K*   of particles as wholes
 /// and, where heat is computed, enthalpies (0 at 0 K) [J], with vent + viscous = stored + radiated + convected + ground +
 /// left to rounding:

@@ -43,6 +43,7 @@ GravityCurrent::GravityCurrent(Spread spread, Real alpha, Real q, Real nu) : spr
   f[1] = 0.75 * f[0] * kStart * kStart * kStart;
   y_ = {1, 1 - kStart * kStart * kStart};
   phi_ = {0, f[0]};
+  beyond_ = {0, f[1]};
   const Real s_end = std::cbrt(0.5), ds = (s_end - kStart) / kStepsOuter;
   const auto outer = [&](Real s, const Shape& v) {
     const Real y = 1 - s * s * s, dy_ds = -3 * s * s;
@@ -53,6 +54,7 @@ GravityCurrent::GravityCurrent(Spread spread, Real alpha, Real q, Real nu) : spr
     const Real s = kStart + (i + 1) * ds;
     y_.push_back(1 - s * s * s);
     phi_.push_back(f[0]);
+    beyond_.push_back(f[1]);
   }
   // From there to the source in ln y: a point source's depth has a logarithm in it.
   const Real l_begin = std::log(0.5), dl = (std::log(kInnermost) - l_begin) / kStepsInner;
@@ -64,8 +66,10 @@ GravityCurrent::GravityCurrent(Spread spread, Real alpha, Real q, Real nu) : spr
     runge_kutta_step(inner, l_begin + i * dl, dl, f);
     y_.push_back(std::exp(l_begin + (i + 1) * dl));
     phi_.push_back(f[0]);
+    beyond_.push_back(f[1]);
   }
   const Real volume = f[1] + phi_.back() * kInnermost * (round ? kInnermost / 2 : 1);
+  for (Real& share : beyond_) share /= volume;
   eta_ = round ? power(2 * kPi * volume, -3.0 / 8) : power(volume, -3.0 / 5);
 }
 
@@ -95,6 +99,16 @@ Real GravityCurrent::depth(Real x, Real t) const {
 }
 
 Real GravityCurrent::volume(Real t) const { return q_ * power(t, alpha_); }
+
+Real GravityCurrent::place(Real share) const {
+  CHECK_GE(share, 0);
+  CHECK_LE(share, 1);
+  const Real beyond = 1 - share;
+  const auto above = std::upper_bound(beyond_.begin(), beyond_.end(), beyond);
+  if (above == beyond_.end()) return 0;
+  const auto i = static_cast<std::size_t>(above - beyond_.begin());
+  return y_[i - 1] + (y_[i] - y_[i - 1]) * (beyond - beyond_[i - 1]) / (beyond_[i] - beyond_[i - 1]);
+}
 
 Real PlanarSlopeCurrent::front(Real t) const {
   CHECK_GT(nu, 0);

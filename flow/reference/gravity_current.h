@@ -37,12 +37,13 @@ class GravityCurrent {
   Real front(Real t) const;                    ///< x_N or r_N [m]
   Real depth(Real x, Real t) const;            ///< h at x or r >= 0 [m]; 0 beyond the front
   Real volume(Real t) const;                   ///< q t^alpha [m^2] or [m^3]
+  Real place(Real share) const;                ///< x / x_N or r / r_N within which that share (0 to 1) of the volume lies
 
  private:
   Spread spread_;
   Real alpha_, q_, k_;
   Real eta_ = 0, exponent_ = 0;
-  std::vector<Real> y_, phi_;  ///< the shape, from the front (y = 1) inwards
+  std::vector<Real> y_, phi_, beyond_;  ///< the shape, from the front (y = 1) inwards; share of the volume between y and the front
 };
 
 /// A line of fluid released on a slope, long after: depth as the root of the distance behind a sudden front.

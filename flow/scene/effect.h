@@ -24,6 +24,7 @@ struct World {
 /// What an effect is expected to cost: for `effuse check`.
 struct Estimate {
   double particles = 0;  ///< at the end
+  double mean_particles = 0;  ///< over the film
   double bytes = 0;      ///< of memory, at the end
   double steps = 0;      ///< in all, at the largest stable size
   double seconds = 0;    ///< of two cores; a rough figure

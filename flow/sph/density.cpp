@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "flow/sph/pair_kernels.h"
@@ -15,7 +16,7 @@ namespace effuse::flow::sph {
 namespace {
 constexpr std::size_t kGrain = 256;  // particles a thread takes at a time
 constexpr Real kUnseen = 1e9;   // depth of lava whose surface is far, in spacings
-constexpr Real kNearOff = 1.2;  // spacings below the free surface: nearer, its distance is sure
+constexpr Real kNearOff = 1.55;  // spacings below the free surface: nearer, its distance is sure
 constexpr Real kFlat = 0.05;     // of a full neighbourhood's moment: with less there is no gradient in that direction
 constexpr Real kNearestWall = 0.25;  // spacings: nearer walls shear no harder
 constexpr Real kLoose = 0.8;    // of the density: with less a particle is a drop or in a sheet
@@ -42,7 +43,6 @@ void find_shape(const ParticleSystem& s, Real lattice, const FilmFriction& film,
   const Real dx = s.spacing, face = dx * dx;
   for (auto* array : {&shape.density, &shape.off, &shape.missing, &shape.exposed, &shape.grounded}) array->resize(n);
   shape.surface.resize(n);
-  shape.slope.resize(n);
   std::vector<Real> depth(n);
   const auto share = [dx](Real distance) { return std::clamp(1.5 - distance / dx, 0.0, 1.0); };
 
@@ -58,10 +58,11 @@ void find_shape(const ParticleSystem& s, Real lattice, const FilmFriction& film,
   const Real power = std::log(kDrop / 2) / std::log((1 - alone) / (1 - sheet));
   const PairsOf pairs(s);
   parallel_ranges(n, kGrain, [&](std::size_t begin, std::size_t end) {
-    pairs->density(begin, end, shape.density, shape.slope);
+    std::array<Vec3, kGrain> slopes;
+    pairs->density(begin, end, shape.density, std::span(slopes).first(end - begin));
     for (std::size_t i = begin; i < end; ++i) {
       Real sum = own + shape.density[i];
-      Vec3 slope = shape.slope[i];
+      Vec3 slope = slopes[i - begin];
       shape.grounded[i] = 0;
       for (const Wall& wall : walls[i]) {
         const BoundaryTable::Row row = s.boundary->at(wall.distance);
@@ -87,18 +88,23 @@ void find_shape(const ParticleSystem& s, Real lattice, const FilmFriction& film,
     }
   });
 
-  parallel_for(n, [&](std::size_t i) {
-    if (walls.first[i] == walls.first[i + 1]) return;
-    Real sum = depth[i], seen = 1;
-    if (depth[i] == kUnseen) {
-      sum = seen = 0;
+  // Those near the wall that do not see the surface hear of it from neighbours, and these from theirs.
+  std::vector<Real> told = depth;
+  for (int round = 0; round < 2; ++round) {
+    parallel_for(n, [&](std::size_t i) {
+      if (walls.first[i] == walls.first[i + 1] || depth[i] != kUnseen) return;
+      Real sum = 0, seen = 0;
       for (const Index j : (*s.neighbors)[i]) {
         if (depth[j] == kUnseen) continue;
         sum += depth[j];
         seen += 1;
       }
-    }
-    const Real friction = film.at(seen > 0 ? sum / seen : kUnseen * dx);
+      if (seen > 0) told[i] = sum / seen;
+    });
+    depth = told;
+  }
+  parallel_for(n, [&](std::size_t i) {
+    const Real friction = film.at(depth[i] == kUnseen ? kUnseen * dx : depth[i]);
     for (Index w = walls.first[i]; w < walls.first[i + 1]; ++w) walls.walls[w].friction = friction;
   });
 }
@@ -132,17 +138,12 @@ void shear_rate_squared(const ParticleSystem& s, Real slip_length, std::span<con
   ZONE("sph.shear rate");
   CHECK_EQ(v.size(), s.size());
   CHECK_EQ(out.size(), s.size());
-  with_kernel(s, [&](const auto& W, auto periodic) {
-    parallel_for(s.size(), [&](std::size_t i) {
-      Mat3 gradient = Mat3::Zero(), moment = Mat3::Zero();
-      for (const Index j : (*s.neighbors)[i]) {
-        const Vec3 d = s.template separation<decltype(periodic)::value>(i, j);
-        const Real r = d.norm();
-        if (r == 0) continue;
-        const Vec3 slope = s.volume() * W.dW(r) / r * d;
-        gradient += (v[j] - v[i]) * slope.transpose();
-        moment -= d * slope.transpose();
-      }
+  const PairsOf pairs(s);
+  parallel_ranges(s.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    std::array<Mat3, kGrain> gradients, moments;
+    pairs->velocity_gradient(begin, end, v, std::span(gradients).first(end - begin), std::span(moments).first(end - begin));
+    for (std::size_t i = begin; i < end; ++i) {
+      Mat3 gradient = gradients[i - begin], moment = moments[i - begin];
       for (const Wall& wall : (*s.walls)[i]) {
         const BoundaryTable::Row row = s.boundary->at(wall.distance);
         const Real depth = std::max(wall.distance, kNearestWall * s.spacing) + slip_length;
@@ -157,7 +158,7 @@ void shear_rate_squared(const ParticleSystem& s, Real slip_length, std::span<con
         if (eigen.eigenvalues()[k] > kFlat) inverse[k] = 1 / eigen.eigenvalues()[k];
       const Mat3 G = gradient * (eigen.eigenvectors() * inverse.asDiagonal() * eigen.eigenvectors().transpose());
       out[i] = 0.5 * (G + G.transpose()).squaredNorm();
-    });
+    }
   });
 }
 

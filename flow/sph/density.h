@@ -22,11 +22,9 @@ namespace effuse::flow::sph {
 /// Sources: none for `off` and `missing` known to us. Accuracy on a lattice: density 1e-3; of a plane's area 1 %.
 struct FlowShape {
   std::vector<Real> density, off, missing, exposed, grounded;
-  std::vector<Vec3> slope;  ///< V sum grad W of the neighbours alone [1/m]
   std::vector<std::uint8_t> surface;
   std::size_t memory() const {
-    return (density.capacity() + off.capacity() + missing.capacity() + exposed.capacity() + grounded.capacity()) * sizeof(Real) + slope.capacity() * sizeof(Vec3) +
-           surface.capacity();
+    return (density.capacity() + off.capacity() + missing.capacity() + exposed.capacity() + grounded.capacity()) * sizeof(Real) + surface.capacity();
   }
 };
 

@@ -26,6 +26,7 @@ constexpr int kSortInterval = 16;    // steps between two orderings of the parti
 constexpr int kMaxRetries = 8;
 constexpr Real kClearance = 0.25;    // a particle stays this many spacings off the ground
 constexpr Real kTakeBack = 0.2;      // share of a density that is too large that one step takes back
+constexpr Real kFarthestShift = 0.1;  // spacings, a step
 constexpr Real kEnough = 0.3;        // of what is to be taken back may be left
 constexpr Real kFillUp = 0.2;        // share of a density that is too low that compression may make up in one step
 constexpr Real kWake = 2;            // times sleep_speed
@@ -78,12 +79,12 @@ struct ModernLava::Impl {
   Walls walls;
   FlowShape shape;
   PairKernels pairs;
-  std::vector<Vec3> lx, lv, start, predicted, work, shift;
-  std::vector<Real> lq, lmu, rate, least, kappa, scratch, wall_distances;
+  std::vector<Vec3> lx, lv, start, predicted;
+  std::vector<Real> lq, lmu, rate, least, scratch, wall_distances;
   std::vector<std::uint8_t> fixed;
   ViscositySolver viscosity;
   PressureSolver pressure;
-  std::vector<Vec3> before_x, before_v;
+  std::vector<Vec3> before_x;
   // What points() shows.
   mutable std::vector<Real> radius, crust, age, p;
 
@@ -260,6 +261,7 @@ struct ModernLava::Impl {
     pairs.build(s);
     bend_walls(s, walls, wall_distances);
     find_shape(s, lattice, film, walls, shape);
+    pressure.prepare(s);
     const std::size_t moving = set.awake + set.drowsy;
     parallel_for(moving, [&](std::size_t k) {
       const Index i = set.particles[k];
@@ -305,7 +307,6 @@ struct ModernLava::Impl {
     rate.resize(m);
     least.assign(m, 0.0);
     predicted.resize(m);
-    work.resize(m);
     lv = start;
     parallel_for(m, [&](std::size_t k) {
       lq[k] = std::max(q[set.particles[k]], 0.0);
@@ -313,33 +314,35 @@ struct ModernLava::Impl {
     }, 2048);
     report.pressure_iterations = report.viscosity_iterations = report.density_iterations = 0;
     for (int round = 0; round < o.coupling; ++round) {
-      pressure_acceleration(s, lq, work);
-      parallel_for(m, [&](std::size_t k) { predicted[k] = s.is_fixed(k) ? start[k] : Vec3(start[k] + dt * (work[k] + o.gravity)); }, 2048);
+      pressure_acceleration(s, lq, predicted);
+      parallel_for(m, [&](std::size_t k) { predicted[k] = s.is_fixed(k) ? start[k] : Vec3(start[k] + dt * (predicted[k] + o.gravity)); }, 2048);
       const ViscosityResult viscous = viscosity.solve(s, o.density, lmu, o.slip_length, dt, predicted, o.viscosity_tolerance, o.max_iterations, lv);
       report.viscosity_iterations += viscous.iterations;
       report.viscosity_residual = viscous.residual;
       if (!(viscous.residual < 100 * o.viscosity_tolerance)) return false;
-      const PressureResult pressed = pressure.solve(s, rate, least, dt, o.divergence_tolerance, o.max_iterations, lv, lq);
+      const PressureResult pressed = pressure.solve_prepared(s, rate, least, dt, o.divergence_tolerance, o.max_iterations, lv, lq);
       report.pressure_iterations += pressed.iterations;
       report.divergence_error = pressed.error;
     }
     // Where density is too large, out of it; nothing else may be compressed by that.
+    std::vector<Vec3>& shift = predicted;
     shift.assign(m, Vec3::Zero());
     if (report.density_error > o.density_tolerance) {
-      kappa.assign(m, 0.0);
       parallel_for(m, [&](std::size_t k) {
         const Real excess = shape.density[k] - 1;
         rate[k] = excess > 0 ? -kTakeBack * excess : -0.5 * excess;
+        // What stands still asks for no room: a neighbour barely in reach would have to go far to give it.
+        if (s.is_fixed(k)) rate[k] = std::max(rate[k], 0.0);
       }, 2048);
       // A share is taken back each step: it need not be exact.
       const Real enough = std::max(o.density_tolerance, kEnough * kTakeBack * report.density_error);
-      // A displacement in no time: walls that move do not move in it.
-      if (std::any_of(walls.walls.begin(), walls.walls.end(), [](const Wall& wall) { return !wall.velocity.isZero(); })) {
-        scratch.resize(m);
-        compression_rate(s, shift, scratch);
-        parallel_for(m, [&](std::size_t k) { rate[k] += scratch[k]; }, 2048);
-      }
-      report.density_iterations = pressure.solve(s, rate, least, 1, enough, o.density_iterations, shift, kappa).iterations;
+      report.density_iterations = pressure.displace(s, rate, enough, o.density_iterations, shift).iterations;
+      // A particle with hardly any neighbours would have to go far to make room: it need not, it has the next steps.
+      const Real farthest = kFarthestShift * o.spacing;
+      parallel_for(m, [&](std::size_t k) {
+        const Real far = shift[k].norm();
+        if (far > farthest) shift[k] *= farthest / far;
+      }, 2048);
     }
     const Real limit = o.spacing / 2;
     return parallel_max(m, 0, [&](std::size_t k) {
@@ -452,16 +455,20 @@ struct ModernLava::Impl {
       emitter.carry(time, dt / 2, v);
       parallel_for(m, [&](std::size_t k) { start[k] = v[set.particles[k]]; }, 2048);
     }
-    before_x = x;
+    // Where all are looked at, lx holds the places of the step's beginning.
+    const bool all = set.awake == size();
+    if (!all) before_x = x;
     parallel_for(set.awake, [&](std::size_t k) {
       const Index i = set.particles[k];
       v[i] = lv[k];
       q[i] = lq[k];
-      x[i] += dt * lv[k] + shift[k];
+      x[i] += dt * lv[k] + predicted[k];  // its shift by now
     }, 2048);
+    // Sleepers take up the load, or they would have to yield to it anew each step.
+    for (std::size_t k = set.awake; k < set.awake + set.drowsy; ++k) q[set.particles[k]] = lq[k];
     acceleration = 0;
     if (m > 0) acceleration = std::sqrt(parallel_max(set.awake, 0, [&](std::size_t k) { return ((lv[k] - start[k]) / dt).squaredNorm(); }));
-    ground.moved(before_x, x);
+    ground.moved(all ? lx : before_x, x);
     ground.project(x, v, [&](std::size_t i) { return !emitter.held(i) && !asleep[i]; });
     fall_asleep(dt);
     wrap();
@@ -588,8 +595,8 @@ std::size_t ModernLava::memory() const {
   const auto bytes = [](const auto&... vectors) { return ((vectors.capacity() * sizeof(vectors[0])) + ...); };
   return bytes(m.x, m.v, m.q, m.mu, m.density, m.exposed, m.grounded, m.ground_T, m.slow, m.surface, m.asleep) + m.census.memory() + m.frames.memory() +
          m.ground.memory() + m.emitter.memory() + m.heat.memory() + m.grid.memory() + m.neighbors.memory() + m.pairs.memory() + m.shape.memory() + m.viscosity.memory() +
-         m.pressure.memory() + bytes(m.set.particles, m.walls.first, m.walls.walls, m.lx, m.lv, m.start, m.predicted, m.work, m.shift, m.lq, m.lmu, m.rate, m.least,
-                                     m.kappa, m.scratch, m.wall_distances, m.fixed, m.before_x, m.before_v, m.radius, m.crust, m.age, m.p);
+         m.pressure.memory() + bytes(m.set.particles, m.walls.first, m.walls.walls, m.lx, m.lv, m.start, m.predicted, m.lq, m.lmu, m.rate, m.least,
+                                     m.scratch, m.wall_distances, m.fixed, m.before_x, m.radius, m.crust, m.age, m.p);
 }
 
 void ModernLava::add_to(StateHash& hash) const {

@@ -21,7 +21,7 @@ namespace effuse::flow::sph {
 
 struct ModernOptions {
   Real spacing = 1;          ///< dx [m]; a particle's volume is dx^3, always
-  Real support = 3;          ///< of the kernels, in spacings: viscosity is right to 1 % / 5 % (lattice / 10 % jitter) at 3, 3 % / 11 % at 2.6, 11 % / 25 % at 2
+  Real support = 3;          ///< of the kernels, in spacings: viscosity is right to 1 % / 6 % (lattice / 10 % jitter) at 3, 5 % / 11 % at 2.6, 17 % / 26 % at 2
   KernelKind kernel = KernelKind::kWendlandC2;  ///< of density and pressure
   Real density = 2600;       ///< rho [kg/m^3]
   Vec3 gravity = Vec3(0, 0, -kGravity);  ///< [m/s^2]

@@ -14,13 +14,13 @@
 namespace effuse::flow::sph {
 
 struct PairKernels::Lanes {
-  void (*density)(const View&, double, double, std::size_t, std::size_t, double*, double*);
+  void (*density)(const View&, double, double, std::size_t, std::size_t, double*, double*, std::size_t);
   void (*viscous)(const View&, double, std::size_t, std::size_t, const double*, double*);
   void (*viscous_block)(const View&, double, std::size_t, std::size_t, double*);
   void (*friction_power)(const View&, double, std::size_t, std::size_t, const double*, double*);
   void (*velocity_gradient)(const View&, double, double, std::size_t, std::size_t, const double*, double*, double*);
-  void (*divergence)(const View&, double, std::size_t, std::size_t, const double*, double*);
-  void (*gradient)(const View&, double, std::size_t, std::size_t, const double*, double*);
+  void (*divergence)(const View&, double, std::size_t, std::size_t, const double*, double*, std::size_t);
+  void (*gradient)(const View&, double, std::size_t, std::size_t, const double*, double*, std::size_t);
   void (*compliance)(const View&, double, std::size_t, std::size_t, const double*, double*, double*);
 };
 
@@ -241,8 +241,9 @@ void PairKernels::check(std::size_t begin, std::size_t end, std::size_t in, std:
 }
 
 void PairKernels::density(std::size_t begin, std::size_t end, std::span<Real> sum, std::span<Vec3> slope) const {
-  check(begin, end, sum.size(), slope.size());
-  if (begin < end) lanes_->density(view_, volume_ * height_, volume_ * slope_ * support_, begin, end, sum.data(), slope[0].data());
+  check(begin, end, sum.size(), size());
+  CHECK(slope.size() == size() || slope.size() == end - begin);
+  if (begin < end) lanes_->density(view_, volume_ * height_, volume_ * slope_ * support_, begin, end, sum.data(), slope[0].data(), slope.size() == size() ? 0 : begin);
 }
 
 void PairKernels::viscous(std::size_t begin, std::size_t end, std::span<const Vec3> v, std::span<Vec3> out) const {
@@ -276,13 +277,15 @@ void PairKernels::velocity_gradient(std::size_t begin, std::size_t end, std::spa
 }
 
 void PairKernels::divergence(std::size_t begin, std::size_t end, std::span<const Vec3> v, std::span<Real> out) const {
-  check(begin, end, v.size(), out.size());
-  if (begin < end) lanes_->divergence(view_, volume_ * slope_ * support_, begin, end, v[0].data(), out.data());
+  check(begin, end, v.size(), size());
+  CHECK(out.size() == size() || out.size() == end - begin);
+  if (begin < end) lanes_->divergence(view_, volume_ * slope_ * support_, begin, end, v[0].data(), out.data(), out.size() == size() ? 0 : begin);
 }
 
 void PairKernels::gradient(std::size_t begin, std::size_t end, std::span<const Real> q, std::span<Vec3> out) const {
-  check(begin, end, q.size(), out.size());
-  if (begin < end) lanes_->gradient(view_, volume_ * slope_ * support_, begin, end, q.data(), out[0].data());
+  check(begin, end, q.size(), size());
+  CHECK(out.size() == size() || out.size() == end - begin);
+  if (begin < end) lanes_->gradient(view_, volume_ * slope_ * support_, begin, end, q.data(), out[0].data(), out.size() == size() ? 0 : begin);
 }
 
 void PairKernels::compliance(std::size_t begin, std::size_t end, std::span<const Real> weight, std::span<Vec3> slope, std::span<Real> squares) const {

@@ -12,13 +12,13 @@ namespace effuse::flow::sph {
 /// The products over pairs that the implicit solvers repeat, on positions packed for that: eight neighbours at once.
 /// With  d = x_i - x_j,  r = |d|,  F = (dW/dr)/r,  V the particles' volume, w ViscousWeight, j over i's neighbours:
 ///
-///   density       V sum W,  V sum F d        (W(0) of i itself is not in it)  [1], [1/m]
+///   density       V sum W,  V sum F d        (W(0) of i itself is not in it)  [1], [1/m]; slopes: as divergence's out
 ///   viscous       V sum mu_ij w (v_ij . d) d,   mu_ij = 2 mu_i mu_j / (mu_i + mu_j)
 ///   viscous_block V sum mu_ij w d d^T                                         its diagonal blocks; out: of [begin, end) only
 ///   friction_power V sum mu_ij w (v_ij . d)^2                                 [W/m^3], twice what i has of it
 ///   velocity_gradient  V sum F (v_j - v_i) d^T,  -V sum F d d^T               [1/s], [1]; out: of [begin, end) only
-///   divergence    V sum F (v_ij . d)                                          [1/s] of v [m/s]
-///   gradient      V sum (q_i + q_j) F d                                       [.../m] of q
+///   divergence    V sum F (v_ij . d)                                          [1/s] of v [m/s]; out: of all, or of [begin, end) only
+///   gradient      V sum (q_i + q_j) F d                                       [.../m] of q; the same
 ///   compliance    V sum F d,  sum weight_j (V F r)^2                          the pressure matrix's diagonal
 ///
 /// Double throughout. What i takes from j is to the last bit what j takes from i, with the sign turned: the operators

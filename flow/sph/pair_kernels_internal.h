@@ -73,7 +73,7 @@ INLINE void store_symmetric(double* m, double factor, D8 xx, D8 yy, D8 zz, D8 xy
   m[2] = m[6] = factor * sum(zx);
 }
 
-void density(const View& s, double factor, double slope_factor, std::size_t begin, std::size_t end, double* sum_out, double* slope_out) {
+void density(const View& s, double factor, double slope_factor, std::size_t begin, std::size_t end, double* sum_out, double* slope_out, std::size_t origin) {
   for (std::size_t i = begin; i < end; ++i) {
     const List list = list_of(s, i);
     const One me = one(s, i);
@@ -88,9 +88,9 @@ void density(const View& s, double factor, double slope_factor, std::size_t begi
     }
     // Those that fill up the last group are i itself: each has added 1.
     sum_out[i] = factor * (sum(W) - (static_cast<double>(list.end - list.begin) - list.count));
-    slope_out[3 * i] = slope_factor * sum(x);
-    slope_out[3 * i + 1] = slope_factor * sum(y);
-    slope_out[3 * i + 2] = slope_factor * sum(z);
+    slope_out[3 * (i - origin)] = slope_factor * sum(x);
+    slope_out[3 * (i - origin) + 1] = slope_factor * sum(y);
+    slope_out[3 * (i - origin) + 2] = slope_factor * sum(z);
   }
 }
 
@@ -135,7 +135,7 @@ void viscous_block(const View& s, double factor, std::size_t begin, std::size_t 
   }
 }
 
-void divergence(const View& s, double factor, std::size_t begin, std::size_t end, const double* v, double* out) {
+void divergence(const View& s, double factor, std::size_t begin, std::size_t end, const double* v, double* out, std::size_t origin) {
   for (std::size_t i = begin; i < end; ++i) {
     const List list = list_of(s, i);
     const One me = one(s, i);
@@ -147,11 +147,11 @@ void divergence(const View& s, double factor, std::size_t begin, std::size_t end
       load_vectors(v, j, ux, uy, uz);
       total = total + slope_over_r(s.kernel, root(e.r2)) * ((vx - ux) * e.dx + (vy - uy) * e.dy + (vz - uz) * e.dz);
     }
-    out[i] = factor * sum(total);
+    out[i - origin] = factor * sum(total);
   }
 }
 
-void gradient(const View& s, double factor, std::size_t begin, std::size_t end, const double* q, double* out) {
+void gradient(const View& s, double factor, std::size_t begin, std::size_t end, const double* q, double* out, std::size_t origin) {
   for (std::size_t i = begin; i < end; ++i) {
     const List list = list_of(s, i);
     const One me = one(s, i);
@@ -164,9 +164,9 @@ void gradient(const View& s, double factor, std::size_t begin, std::size_t end, 
       y = y + f * e.dy;
       z = z + f * e.dz;
     }
-    out[3 * i] = factor * sum(x);
-    out[3 * i + 1] = factor * sum(y);
-    out[3 * i + 2] = factor * sum(z);
+    out[3 * (i - origin)] = factor * sum(x);
+    out[3 * (i - origin) + 1] = factor * sum(y);
+    out[3 * (i - origin) + 2] = factor * sum(z);
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <Eigen/QR>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -15,7 +16,37 @@ namespace effuse::flow::sph {
 namespace {
 
 constexpr std::size_t kGrain = 256;  // particles a thread takes at a time
-constexpr Real kExpansion = 0.5;  // step down the scaled gradient; stable below 2 / |A scaled|, which is about 3
+constexpr float kExpansion = 0.5;  // step down the scaled gradient; stable below 2 / |A scaled|, which is about 3
+constexpr float kOnBound = 1e-6f;  // of an unknown: rounding in single precision
+constexpr Real kDigits = 1e-4;     // of the error single precision takes away at a time
+constexpr Real kMargin = 0.1;      // of the tolerance, where single precision alone does not reach it
+constexpr Real kGain = 0.5;        // a round of refinement that leaves more was the last
+constexpr Real kFloatNoise = 6e-8;  // of a product's terms: rounding in single precision
+constexpr Real kTrust = 1e-3;      // of the tolerance: more noise is looked into
+
+/// Sum of f(i), eight in turn: lanes for the compiler, one order on every processor.
+template <class F>
+Real lane_sum(std::size_t begin, std::size_t end, F&& f) {
+  Real lanes[8] = {};
+  std::size_t i = begin;
+  for (; i + 8 <= end; i += 8)
+    for (std::size_t k = 0; k < 8; ++k) lanes[k] += f(i + k);
+  for (std::size_t k = 0; i < end; ++i, ++k) lanes[k] += f(i);
+  return ((lanes[0] + lanes[4]) + (lanes[2] + lanes[6])) + ((lanes[1] + lanes[5]) + (lanes[3] + lanes[7]));
+}
+template <class F>
+float lane_min(std::size_t begin, std::size_t end, F&& f) {
+  constexpr float kMost = std::numeric_limits<float>::infinity();
+  float lanes[8] = {kMost, kMost, kMost, kMost, kMost, kMost, kMost, kMost};
+  std::size_t i = begin;
+  for (; i + 8 <= end; i += 8)
+    for (std::size_t k = 0; k < 8; ++k) {
+      const float value = f(i + k);
+      lanes[k] = value < lanes[k] ? value : lanes[k];
+    }
+  for (std::size_t k = 0; i < end; ++i, ++k) lanes[k] = std::min(lanes[k], f(i));
+  return *std::min_element(lanes, lanes + 8);
+}
 
 }  // namespace
 
@@ -67,172 +98,285 @@ void smooth_linear(const ParticleSystem& s, std::span<const Real> values, std::s
   });
 }
 
-PressureResult PressureSolver::solve(const ParticleSystem& s, std::span<const Real> rate, std::span<const Real> least, Real dt, Real tolerance, int max_iterations,
-                                     std::span<Vec3> v, std::span<Real> q) {
+// f(begin, end) returns a range's share of some sums (and of one minimum).
+template <class F>
+PressureSolver::Sums PressureSolver::sum_of(F&& f) {
+  parallel_ranges(y_.size(), kGrain, [&](std::size_t begin, std::size_t end) { partial_[begin / kGrain] = f(begin, end); });
+  Sums sum;
+  for (const Sums& part : partial_) sum += part;
+  return sum;
+}
+
+void PressureSolver::prepare(const ParticleSystem& s) {
   ZONE("sph.pressure");
   const std::size_t n = s.size();
-  CHECK_EQ(rate.size(), n);
-  CHECK_EQ(least.size(), n);
-  CHECK_EQ(v.size(), n);
-  CHECK_EQ(q.size(), n);
-  for (std::vector<Real>* a : {&y_, &low_, &scale_, &g_, &p_, &Ap_, &work_}) a->resize(n);
+  for (std::vector<float>* array : {&y_, &low_, &scale_, &g_, &p_, &Ap_}) array->resize(n);
   a_.resize(n);
   partial_.resize((n + kGrain - 1) / kGrain);
-  PressureResult result;
-  if (n == 0) return {0, 0, true};
-  const PairsOf own(s);
-  const PairKernels& pairs = *own.get();
-
-  // f(begin, end) returns a range's share of some sums (and of one minimum).
-  const auto sum_of = [&](auto&& f) {
-    parallel_ranges(n, kGrain, [&](std::size_t begin, std::size_t end) { partial_[begin / kGrain] = f(begin, end); });
-    Sums sum;
-    for (const Sums& part : partial_) sum += part;
-    return sum;
-  };
+  push_.resize(s.walls->walls.size());
+  pairs_.build(s);
 
   // Diagonal of A, by which the unknowns are scaled: q = scale y. And what walls push, once.
-  push_.resize(s.walls->walls.size());
-  parallel_for(n, [&](std::size_t i) { work_[i] = s.is_fixed(i) ? 0 : 1; }, 4096);
+  parallel_for(n, [&](std::size_t i) { pairs_.set(i, s.is_fixed(i) ? 0.0f : 1.0f); }, 4096);
   parallel_ranges(n, kGrain, [&](std::size_t begin, std::size_t end) {
-    pairs.compliance(begin, end, work_, a_, scale_);
+    pairs_.compliance(begin, end, a_, scale_);
     for (std::size_t i = begin; i < end; ++i) {
-      Vec3 slope = a_[i];
+      Real diagonal = scale_[i];
+      Vec3 slope(a_[i].x, a_[i].y, a_[i].z);
       for (Index k = s.walls->first[i]; k < s.walls->first[i + 1]; ++k) {
         push_[k] = 2 * s.boundary->at(s.walls->walls[k].distance).slope * s.walls->walls[k].normal;
         slope += push_[k];
       }
-      const Real diagonal = work_[i] * slope.squaredNorm() + scale_[i];
-      scale_[i] = diagonal > 0 ? 1 / std::sqrt(diagonal) : 0;
+      if (!s.is_fixed(i)) diagonal += slope.squaredNorm();
+      scale_[i] = diagonal > 0 ? static_cast<float>(1 / std::sqrt(diagonal)) : 0;
     }
   });
+}
 
-  // a_ = -D^T q, 0 for fixed particles.
-  const auto accelerate = [&](std::span<const Real> of) {
-    parallel_ranges(n, kGrain, [&](std::size_t begin, std::size_t end) {
-      pairs.gradient(begin, end, of, a_);
-      for (std::size_t i = begin; i < end; ++i) {
-        if (s.is_fixed(i)) {
-          a_[i].setZero();
-          continue;
-        }
-        Vec3 sum = a_[i];
-        for (Index k = s.walls->first[i]; k < s.walls->first[i + 1]; ++k) sum += of[i] * push_[k];
-        a_[i] = -sum;
-      }
-    });
-  };
-  // Ap = scale A scale p, with work = scale p; returns p . Ap and p . g.
-  const auto multiply = [&] {
-    accelerate(work_);
-    return sum_of([&](std::size_t begin, std::size_t end) {
-      pairs.divergence(begin, end, a_, Ap_);
-      Sums sum;
-      for (std::size_t i = begin; i < end; ++i) {
-        Real rate_i = Ap_[i];
-        for (Index k = s.walls->first[i]; k < s.walls->first[i + 1]; ++k) rate_i += push_[k].dot(a_[i]);
-        Ap_[i] = -scale_[i] * rate_i;
-        sum.first += p_[i] * Ap_[i];
-        sum.second += p_[i] * g_[i];
-      }
-      return sum;
-    });
-  };
-  // p = f(i), work = scale p; returns the longest step along -p that leaves none below its bound.
+/// a_ = -D^T of the packed q = scale p, 0 for fixed particles.
+void PressureSolver::accelerate(const ParticleSystem& s) {
+  const Index* first = s.walls->first.data();
+  FloatPairs::Vector* a = a_.data();
+  parallel_ranges(y_.size(), kGrain, [&](std::size_t begin, std::size_t end) {
+    pairs_.gradient(begin, end, a_);
+    for (std::size_t i = begin; i < end; ++i) a[i] = {-a[i].x, -a[i].y, -a[i].z, 0};
+    for (Index k = first[begin], i = static_cast<Index>(begin); k < first[end]; ++k) {
+      while (k >= first[i + 1]) ++i;
+      const Eigen::Vector3f push = scale_[i] * p_[i] * push_[k].cast<float>();
+      a[i] = {a[i].x - push.x(), a[i].y - push.y(), a[i].z - push.z(), 0};
+    }
+    if (s.fixed.empty()) return;
+    for (std::size_t i = begin; i < end; ++i)
+      if (s.fixed[i]) a[i] = {};
+  });
+}
+
+/// Ap = scale A scale p, with scale p packed; returns p . Ap and p . g.
+PressureSolver::Sums PressureSolver::multiply(const ParticleSystem& s) {
+  accelerate(s);
+  const Index* first = s.walls->first.data();
+  const float *scale = scale_.data(), *g = g_.data(), *p = p_.data();
+  float* Ap = Ap_.data();
+  return sum_of([&](std::size_t begin, std::size_t end) {
+    pairs_.divergence(begin, end, a_, Ap_);
+    for (Index k = first[begin], i = static_cast<Index>(begin); k < first[end]; ++k) {
+      while (k >= first[i + 1]) ++i;
+      const Eigen::Vector3f push = push_[k].cast<float>();
+      Ap[i] += push.x() * a_[i].x + push.y() * a_[i].y + push.z() * a_[i].z;
+    }
+    for (std::size_t i = begin; i < end; ++i) Ap[i] *= -scale[i];
+    Sums sum;
+    sum.first = lane_sum(begin, end, [=](std::size_t i) { return static_cast<Real>(p[i]) * Ap[i]; });
+    sum.second = lane_sum(begin, end, [=](std::size_t i) { return static_cast<Real>(p[i]) * g[i]; });
+    return sum;
+  });
+}
+
+/// From y = 0 and its gradient: y until the error's sum of squares is down to goal. Returns the sums of advance() there.
+PressureSolver::Sums PressureSolver::iterate(const ParticleSystem& s, Real dt, Real goal, int max_iterations, int& iterations) {
+  const float *low = low_.data(), *scale = scale_.data();
+  float *y = y_.data(), *g = g_.data(), *p = p_.data(), *Ap = Ap_.data();
+
+  // p = f(i), packed = scale p; returns the longest step along -p that leaves none below its bound.
   const auto direct = [&](auto&& f) {
     return sum_of([&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) p[i] = f(i);
+      for (std::size_t i = begin; i < end; ++i) pairs_.set(i, scale[i] * p[i]);
       Sums sum;
-      for (std::size_t i = begin; i < end; ++i) {
-        p_[i] = f(i);
-        work_[i] = scale_[i] * p_[i];
-        if (p_[i] > 0) sum.least = std::min(sum.least, (y_[i] - low_[i]) / p_[i]);
-      }
+      sum.least = lane_min(begin, end, [=](std::size_t i) {
+        const float room = (y[i] - low[i]) / p[i];
+        return p[i] > 0 ? room : std::numeric_limits<float>::infinity();
+      });
       return sum;
     }).least;
   };
   // Free gradient: of unknowns off their bound; chopped: of those on it that want off.
-  const auto free = [&](std::size_t i) { return y_[i] > low_[i] ? g_[i] : 0.0; };
-  const auto chopped = [&](std::size_t i) { return y_[i] > low_[i] ? 0.0 : std::min(g_[i], 0.0); };
+  const auto free = [=](std::size_t i) { return y[i] > low[i] ? g[i] : 0.0f; };
+  const auto chopped = [=](std::size_t i) {
+    const float down = g[i] < 0 ? g[i] : 0.0f;
+    return y[i] > low[i] ? 0.0f : down;
+  };
   // y -= step p, g -= step Ap; returns |free|^2, |chopped|^2, the error squared, and free . Ap.
-  const auto advance = [&](Real step) {
+  const auto advance = [&](Real length) {
+    const auto step = static_cast<float>(length);
+    const auto dt4 = dt * dt * dt * dt;
     return sum_of([&](std::size_t begin, std::size_t end) {
-      Sums sum;
+      float f[kGrain], e[kGrain];
       for (std::size_t i = begin; i < end; ++i) {
-        y_[i] -= step * p_[i];
-        g_[i] -= step * Ap_[i];
-        const Real f = free(i), c = chopped(i), e = scale_[i] > 0 ? dt * dt * (f + c) / scale_[i] : 0;
-        sum.first += f * f;
-        sum.second += c * c;
-        sum.third += e * e;
-        sum.fourth += f * Ap_[i];
+        const float before = y[i], after = before - step * p[i], most = std::max(std::abs(before), std::abs(after));
+        // Nearer to its bound than rounding can tell: on it.
+        const float now = after - low[i] <= kOnBound * most ? low[i] : after;
+        y[i] = now;
+        g[i] -= step * Ap[i];
       }
+      for (std::size_t i = begin; i < end; ++i) {
+        f[i - begin] = free(i);
+        const float whole = f[i - begin] + chopped(i), error = whole / scale[i];
+        e[i - begin] = scale[i] > 0 ? error : 0.0f;
+      }
+      Sums sum;
+      sum.second = lane_sum(begin, end, [=](std::size_t i) { return static_cast<Real>(chopped(i)) * chopped(i); });
+      sum.first = lane_sum(0, end - begin, [&](std::size_t k) { return static_cast<Real>(f[k]) * f[k]; });
+      sum.third = dt4 * lane_sum(0, end - begin, [&](std::size_t k) { return static_cast<Real>(e[k]) * e[k]; });
+      sum.fourth = lane_sum(0, end - begin, [&](std::size_t k) { return static_cast<Real>(f[k]) * Ap[begin + k]; });
       return sum;
     });
   };
 
-  // Of half y A y - b y the gradient at the old pressures is (rate - D v) / dt. Pressures below their bound begin there.
-  parallel_ranges(n, kGrain, [&](std::size_t begin, std::size_t end) {
-    pairs.divergence(begin, end, v, Ap_);
-    for (std::size_t i = begin; i < end; ++i) {
-      Real rate_i = Ap_[i];
-      for (Index k = s.walls->first[i]; k < s.walls->first[i + 1]; ++k) rate_i += push_[k].dot(v[i] - s.walls->walls[k].velocity);
-      g_[i] = scale_[i] * (rate[i] - rate_i) / dt;
-      y_[i] = scale_[i] > 0 ? q[i] / scale_[i] : 0;
-      low_[i] = scale_[i] > 0 ? least[i] / scale_[i] : 0;
-    }
-  });
-  direct([&](std::size_t i) { return -std::max(low_[i] - y_[i], 0.0); });
-  if (parallel_max(n, 0, [&](std::size_t i) { return -p_[i]; }) > 0) multiply();
-  else std::fill(Ap_.begin(), Ap_.end(), 0.0);
+  // Pressures below their bound begin there.
+  direct([=](std::size_t i) { return low[i] > 0 ? -low[i] : 0.0f; });
+  const bool lifted = parallel_max(y_.size(), 0, [=](std::size_t i) { return low[i]; }) > 0;
+  if (lifted) multiply(s);
+  else std::fill(Ap_.begin(), Ap_.end(), 0.0f);
   Sums sums = advance(1);
 
-  const Real goal = tolerance * tolerance * static_cast<Real>(n);
-  Real feasible = direct(free);
-  while (sums.third > goal && result.iterations < max_iterations) {
-    ++result.iterations;
+  Real feasible = 0;
+  bool directed = false;  // p conjugate to the last
+  while (sums.third > goal && iterations < max_iterations) {
+    ++iterations;
     if (sums.second <= sums.first) {
-      const Sums products = multiply();
+      if (!directed) feasible = direct(free);
+      const Sums products = multiply(s);
       if (!(products.first > 0)) break;
       const Real step = products.second / products.first;
       if (step <= feasible) {
         sums = advance(step);
-        const Real beta = sums.fourth / products.first;
-        feasible = direct([&](std::size_t i) { return free(i) - beta * p_[i]; });
+        const auto beta = static_cast<float>(sums.fourth / products.first);
+        if (sums.third > goal) feasible = direct([=](std::size_t i) { return free(i) - beta * p[i]; });
+        directed = true;
         continue;
       }
       // Expansion: to the bound, then a projected step down the gradient.
       advance(feasible);
-      direct([&](std::size_t i) { return y_[i] - std::max(low_[i], y_[i] - kExpansion * free(i)); });
-      multiply();
+      direct([=](std::size_t i) { return y[i] - std::max(low[i], y[i] - kExpansion * free(i)); });
+      multiply(s);
       sums = advance(1);
-      ++result.iterations;
+      ++iterations;
     } else {
       // Proportioning: those on the bound that want off leave it.
       direct(chopped);
-      const Sums products = multiply();
+      const Sums products = multiply(s);
       if (!(products.first > 0)) break;
       sums = advance(sums.second / products.first);
     }
-    feasible = direct(free);
+    directed = false;
   }
-  result.error = std::sqrt(sums.third / static_cast<Real>(n));
-  result.converged = sums.third <= goal;
+  return sums;
+}
 
-  // v += dt a(q_new - q_old)
+PressureResult PressureSolver::solve(const ParticleSystem& s, std::span<const Real> rate, std::span<const Real> least, Real dt, Real tolerance, int max_iterations,
+                                     std::span<Vec3> v, std::span<Real> q) {
+  prepare(s);
+  return solve_prepared(s, rate, least, dt, tolerance, max_iterations, v, q);
+}
+
+PressureResult PressureSolver::solve_prepared(const ParticleSystem& s, std::span<const Real> rate, std::span<const Real> least, Real dt, Real tolerance,
+                                              int max_iterations, std::span<Vec3> v, std::span<Real> q) {
+  ZONE("sph.pressure");
+  const std::size_t n = s.size();
+  CHECK_EQ(y_.size(), n);
+  CHECK_EQ(push_.size(), s.walls->walls.size());
+  CHECK_EQ(rate.size(), n);
+  CHECK_EQ(least.size(), n);
+  CHECK_EQ(v.size(), n);
+  CHECK_EQ(q.size(), n);
+  PressureResult result;
+  if (n == 0) return {0, 0, true};
+  const PairsOf own(s);
+  const PairKernels& pairs = *own.get();
+  change_.resize(n);
+  const Real count = static_cast<Real>(n), goal = tolerance * tolerance * count;
+
+  bool first = true;
+  for (Real last = std::numeric_limits<Real>::infinity();;) {
+    // Of half y A y - b y the gradient at the pressures that have acted is (rate - D v) / dt.
+    const Real start = sum_of([&](std::size_t begin, std::size_t end) {
+      std::array<Real, kGrain> compression;
+      pairs.divergence(begin, end, v, std::span(compression).first(end - begin));
+      Sums sum;
+      for (std::size_t i = begin; i < end; ++i) {
+        Real rate_i = compression[i - begin];
+        for (Index k = s.walls->first[i]; k < s.walls->first[i + 1]; ++k) rate_i += push_[k].dot(v[i] - s.walls->walls[k].velocity);
+        y_[i] = 0;
+        g_[i] = scale_[i] * static_cast<float>((rate[i] - rate_i) / dt);
+        low_[i] = scale_[i] > 0 ? static_cast<float>((least[i] - q[i]) / scale_[i]) : 0;
+        const Real counts = low_[i] < 0 ? rate_i - rate[i] : std::max(rate_i - rate[i], 0.0);
+        if (scale_[i] > 0) sum.third += dt * dt * counts * counts;
+      }
+      return sum;
+    }).third;
+    // What single precision can do at a time; and no more rounds when they no longer help.
+    const bool stuck = !(start < kGain * kGain * last);
+    last = start;
+    const Real aim = first ? goal : kMargin * kMargin * goal;  // a round that was worth measuring for leaves a margin
+    const Sums sums = iterate(s, dt, std::max(aim, kDigits * kDigits * start), stuck ? 0 : max_iterations, result.iterations);
+    first = false;
+    result.error = std::sqrt(sums.third / count);
+    result.converged = sums.third <= goal;
+
+    // v += dt a(q_new - q_old)
+    const Sums moved = sum_of([&](std::size_t begin, std::size_t end) {
+      Sums sum;
+      for (std::size_t i = begin; i < end; ++i) {
+        const Real next = scale_[i] == 0 ? 0 : y_[i] <= low_[i] ? least[i] : std::max(least[i], q[i] + static_cast<Real>(scale_[i]) * y_[i]);
+        change_[i] = 0;
+        if (y_[i] == 0 && scale_[i] > 0) continue;
+        change_[i] = next - q[i];
+        q[i] = next;
+        if (scale_[i] == 0) continue;
+        const Real size = dt * dt * change_[i] / (static_cast<Real>(scale_[i]) * scale_[i]);
+        sum.first += size * size;
+      }
+      return sum;
+    });
+    if (moved.first == 0) break;
+    parallel_ranges(n, kGrain, [&](std::size_t begin, std::size_t end) {
+      std::array<Vec3, kGrain> gradient;
+      pairs.gradient(begin, end, change_, std::span(gradient).first(end - begin));
+      for (std::size_t i = begin; i < end; ++i) {
+        if (s.is_fixed(i)) continue;
+        Vec3 sum = gradient[i - begin];
+        for (Index k = s.walls->first[i]; k < s.walls->first[i + 1]; ++k) sum += change_[i] * push_[k];
+        v[i] -= dt * sum;
+      }
+    });
+    if (stuck || result.iterations >= max_iterations) break;
+    if (result.converged && kFloatNoise * std::sqrt(moved.first) <= kTrust * tolerance * std::sqrt(count)) break;
+  }
+  COUNT("sph.pressure iterations", result.iterations);
+  return result;
+}
+
+PressureResult PressureSolver::displace(const ParticleSystem& s, std::span<const Real> rate, Real tolerance, int max_iterations, std::span<Vec3> shift) {
+  ZONE("sph.pressure");
+  const std::size_t n = s.size();
+  CHECK_EQ(y_.size(), n);
+  CHECK_EQ(push_.size(), s.walls->walls.size());
+  CHECK_EQ(rate.size(), n);
+  CHECK_EQ(shift.size(), n);
+  PressureResult result;
+  if (n == 0) return {0, 0, true};
+  const Real count = static_cast<Real>(n), goal = tolerance * tolerance * count;
   parallel_for(n, [&](std::size_t i) {
-    const Real next = scale_[i] * y_[i];
-    work_[i] = next - q[i];
-    q[i] = next;
-  }, 4096);
-  accelerate(work_);
-  parallel_for(n, [&](std::size_t i) { v[i] += dt * a_[i]; }, 4096);
+    y_[i] = low_[i] = 0;
+    g_[i] = scale_[i] * static_cast<float>(rate[i]);
+  }, 2048);
+  const Sums sums = iterate(s, 1, goal, max_iterations, result.iterations);
+  result.error = std::sqrt(sums.third / count);
+  result.converged = sums.third <= goal;
+  parallel_for(n, [&](std::size_t i) {
+    p_[i] = y_[i];
+    pairs_.set(i, scale_[i] * y_[i]);
+  }, 2048);
+  accelerate(s);
+  parallel_for(n, [&](std::size_t i) { shift[i] = Vec3(a_[i].x, a_[i].y, a_[i].z); }, 2048);
   COUNT("sph.pressure iterations", result.iterations);
   return result;
 }
 
 std::size_t PressureSolver::memory() const {
-  return (y_.capacity() + low_.capacity() + scale_.capacity() + g_.capacity() + p_.capacity() + Ap_.capacity() + work_.capacity()) * sizeof(Real) + (a_.capacity() + push_.capacity()) * sizeof(Vec3) +
-         partial_.capacity() * sizeof(Sums);
+  return pairs_.memory() + (y_.capacity() + low_.capacity() + scale_.capacity() + g_.capacity() + p_.capacity() + Ap_.capacity()) * sizeof(float) +
+         a_.capacity() * sizeof(FloatPairs::Vector) + push_.capacity() * sizeof(Vec3) + change_.capacity() * sizeof(Real) + partial_.capacity() * sizeof(Sums);
 }
 
 }  // namespace effuse::flow::sph

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "flow/sph/pair_kernels_float.h"
 #include "flow/sph/particle_system.h"
 
 namespace effuse::flow::sph {
@@ -43,12 +44,25 @@ struct PressureResult {
 /// (MPRGP: conjugate gradients on the particles off their bound). v must have been accelerated by q_old already.
 /// With rate = 0 the velocities are free of divergence; a negative rate takes density back that is too large.
 /// The same operators as DFSPH (Bender & Koschier 2015), conjugate gradients in place of Jacobi's iteration.
+///
+/// The iterations run in single precision, on the change of q; what they find acts on v and q in double, and where it matters
+/// what is then left is measured in double and solved for again (iterative refinement). So momentum is kept to
+/// rounding in double, and any tolerance can be reached.
 /// Source of MPRGP: Dostal & Schoeberl 2005, Comput. Optim. Appl. 30, 23-43.
 class PressureSolver {
  public:
   /// rate [1/s], least [m^2/s^2] (minus infinity: no bound), n each; v in, out; q in: old, out: new.
   PressureResult solve(const ParticleSystem& system, std::span<const Real> rate, std::span<const Real> least, Real dt, Real tolerance, int max_iterations,
                        std::span<Vec3> v, std::span<Real> q);
+
+  /// What depends on positions, walls and fixed particles only. solve() does it itself; solve_prepared() and displace() may
+  /// follow as often as wanted, on the same system.
+  void prepare(const ParticleSystem& system);
+  PressureResult solve_prepared(const ParticleSystem& system, std::span<const Real> rate, std::span<const Real> least, Real dt, Real tolerance, int max_iterations,
+                                std::span<Vec3> v, std::span<Real> q);
+  /// The same for a displacement from where particles are, in no time: D shift <= rate [1], by pressures >= 0, walls at
+  /// rest. shift [m] n, out; single precision. error: rms of what is left of D shift - rate where that counts.
+  PressureResult displace(const ParticleSystem& system, std::span<const Real> rate, Real tolerance, int max_iterations, std::span<Vec3> shift);
   std::size_t memory() const;
 
  private:
@@ -63,8 +77,18 @@ class PressureSolver {
       return *this;
     }
   };
-  std::vector<Real> y_, low_, scale_, g_, p_, Ap_, work_;
-  std::vector<Vec3> a_, push_;
+  template <class F>
+  Sums sum_of(F&& f);
+  void accelerate(const ParticleSystem& s);
+  Sums multiply(const ParticleSystem& s);
+  Sums iterate(const ParticleSystem& s, Real dt, Real goal, int max_iterations, int& iterations);
+
+  // Unknowns y = (q - old q) / scale, bounded by low; gradient g, direction p, A p.
+  FloatPairs pairs_;
+  std::vector<float> y_, low_, scale_, g_, p_, Ap_;
+  std::vector<FloatPairs::Vector> a_;
+  std::vector<Vec3> push_;  // of each wall
+  std::vector<Real> change_;
   std::vector<Sums> partial_;
 };
 

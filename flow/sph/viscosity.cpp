@@ -110,7 +110,7 @@ ViscosityResult ViscositySolver::solve(const ParticleSystem& s, Real density, st
 
   // Diagonal blocks, and the right-hand side: what moving walls drag along is known. The norm of the right-hand side
   // counts; of fixed particles nothing is asked.
-  const Sums b2 = sum_of([&](std::size_t begin, std::size_t end) {
+  Sums b2 = sum_of([&](std::size_t begin, std::size_t end) {
     std::array<Mat3, kGrain> block;
     pairs->viscous_block(begin, end, std::span(block).first(end - begin));
     Sums sum;
@@ -166,6 +166,8 @@ ViscosityResult ViscositySolver::solve(const ParticleSystem& s, Real density, st
     }
     return sum;
   });
+  // Where fixed particles alone drive the others, they are in the first residual only.
+  if (b2.plain == 0) b2 = rr;
   const Real goal = tolerance * tolerance;
   const auto reached = [&] { return rr.preconditioned <= goal * b2.preconditioned && rr.plain <= goal * b2.plain; };
   while (!reached() && result.iterations < max_iterations) {
@@ -177,13 +179,14 @@ ViscosityResult ViscositySolver::solve(const ParticleSystem& s, Real density, st
       for (std::size_t i = begin; i < end; ++i) {
         v[i] += alpha * p_[i];
         r_[i] -= alpha * Ap_[i];
-        sum += {r_[i].dot(inverse_[i].solve(r_[i])), r_[i].squaredNorm()};
+        Ap_[i] = inverse_[i].solve(r_[i]);  // kept where A p is no longer needed
+        sum += {r_[i].dot(Ap_[i]), r_[i].squaredNorm()};
       }
       return sum;
     });
     const Real beta = next.preconditioned / rr.preconditioned;
     rr = next;
-    parallel_for(n, [&](std::size_t i) { p_[i] = inverse_[i].solve(r_[i]) + beta * p_[i]; }, 2048);
+    parallel_for(n, [&](std::size_t i) { p_[i] = Ap_[i] + beta * p_[i]; }, 2048);
     ++result.iterations;
   }
   result.residual = b2.plain > 0 ? std::sqrt(std::max(rr.preconditioned / b2.preconditioned, rr.plain / b2.plain)) : 0;

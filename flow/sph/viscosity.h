@@ -14,8 +14,9 @@ namespace effuse::flow::sph {
 /// with w of ViscousWeight: a force along the line between two particles, equal and opposite: linear and angular
 /// momentum are kept to rounding, a rigid rotation feels nothing. In the continuum nu (lap v + 2 grad div v), stress
 /// mu (grad v + grad v^T + I div v). The wall's half-space moves on linearly through zero at slip_length [m] behind
-/// its surface, viscosity mu_i; see BoundaryTable. Error for shear in any direction, on a cubic lattice / with 10 %
-/// jitter (rms): 11 % / 25 % at a support of 2 spacings, 3 % / 11 % at 2.6, 1 % / 5 % at 3.
+/// its surface, viscosity mu_i; see BoundaryTable. Error of the vector for shear in any direction, rms, on a cubic lattice
+/// / with 10 % jitter: 17 % / 26 % at a support of 2 spacings, 5 % / 11 % at 2.6, 1.2 % / 6 % at 3; of the part along it alone
+/// 12 % / 17 %, 3 % / 7 %, 1 % / 3 %.
 /// After Weiler, Koschier, Brand & Bender 2018, Comput. Graph. Forum 37(2), whose weight 10 F / (r^2 + 0.01 h^2) leaves
 /// 20 % / 48 % at 2 spacings and 3 % / 10 % at 3.
 ///

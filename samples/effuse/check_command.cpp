@@ -31,6 +31,7 @@ ExitCode check(const CheckCommand& command, const CommonOptions& common) {
   std::string simulated, left_out;
   for (const flow::EffectPlan& plan : scene.effects) {
     sum.particles += plan.estimate.particles;
+    sum.mean_particles += plan.estimate.mean_particles;
     sum.bytes += plan.estimate.bytes;
     sum.steps += plan.estimate.steps;
     sum.seconds += plan.estimate.seconds;
@@ -42,8 +43,8 @@ ExitCode check(const CheckCommand& command, const CommonOptions& common) {
     if (!named) left_out += (left_out.empty() ? "" : ", ") + kind.name;
   }
   // Skin and files of a frame, as Maunga Whau takes them: 80 us a particle, and 0.7 us a pixel for the picture.
-  const double frame_s = 80e-6 * sum.particles / 2 + (loaded->skin.preview ? 7e-7 * loaded->skin.picture.width * loaded->skin.picture.height : 0);
-  const double seconds = sum.seconds + scene.frames * frame_s, disk = scene.frames * disk_per_frame(sum.particles / 2, loaded->skin);
+  const double frame_s = 80e-6 * sum.mean_particles + (loaded->skin.preview ? 7e-7 * loaded->skin.picture.width * loaded->skin.picture.height : 0);
+  const double seconds = sum.seconds + scene.frames * frame_s, disk = scene.frames * disk_per_frame(sum.mean_particles, loaded->skin);
 
   if (common.json) {
     nlohmann::ordered_json j;

@@ -10,6 +10,7 @@ std::vector<Case> validation_cases() {
   add_heat_cases(cases);
   add_cooling_cases(cases);
   add_rheology_cases(cases);
+  add_terrain_cases(cases);
   return cases;
 }
 

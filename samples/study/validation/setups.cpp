@@ -66,6 +66,18 @@ flow::sph::ModernOptions isothermal(Real spacing, Real mu) {
   return options;
 }
 
+Real mean_radius(std::span<const Vec3> x, Real spacing) {
+  constexpr int kSectors = 48;
+  std::vector<Real> farthest(kSectors, 0);
+  for (const Vec3& p : x) {
+    const int k = std::clamp(static_cast<int>((std::atan2(p.y(), p.x()) / (2 * kPi) + 0.5) * kSectors), 0, kSectors - 1);
+    farthest[static_cast<std::size_t>(k)] = std::max(farthest[static_cast<std::size_t>(k)], std::hypot(p.x(), p.y()));
+  }
+  Real sum = 0;
+  for (Real r : farthest) sum += r;
+  return sum / kSectors + spacing / 2;
+}
+
 Measure compared(std::string what, std::string unit, Real measured, Real reference, Real hold) {
   return {std::move(what), std::move(unit), measured, reference, relative_error(measured, reference), hold, ""};
 }

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -39,6 +40,9 @@ void run_until(flow::sph::ModernLava& lava, Real t, Real max_step, RunStatistics
 
 /// A fluid without heat, gravity down, lava's density; mu [Pa s].
 flow::sph::ModernOptions isothermal(Real spacing, Real mu);
+
+/// Mean over 48 directions of the farthest particle about the vertical through 0, and half a spacing [m].
+Real mean_radius(std::span<const Vec3> x, Real spacing);
 
 /// error = |measured - reference| / |reference|.
 Measure compared(std::string what, std::string unit, Real measured, Real reference, Real hold);

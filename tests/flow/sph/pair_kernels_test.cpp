@@ -2,10 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <cmath>
 #include <ostream>
 #include <string>
 
+#include "flow/sph/pair_kernels_float.h"
 #include "geometry/base/parallel.h"
 #include "geometry/base/random.h"
 
@@ -220,6 +222,97 @@ TEST_P(PairKernelsTest, KeepsMomentumIsSymmetricAndFeelsNoRigidRotation) {
     for (std::size_t i = 0; i < n; ++i) turning[i] = Vec3(omega.norm() * (s.x[i] - GetParam().origin).z(), 0, 0);
     for (const Vec3& a : viscous(turning)) sheared = std::max(sheared, a.norm());
     EXPECT_LT(turned, 2e-14 * sheared + 4e-16 * GetParam().origin.cwiseAbs().maxCoeff() / kSpacing * sheared);
+  }
+}
+/// What FloatPairs makes of a sample.
+struct FloatResults {
+  std::vector<FloatPairs::Vector> gradient, own;
+  std::vector<float> compression, squares;
+  std::vector<std::uint32_t> bits() const {
+    std::vector<std::uint32_t> all;
+    for (const auto* vectors : {&gradient, &own})
+      for (const auto& a : *vectors)
+        for (const float value : {a.x, a.y, a.z}) all.push_back(std::bit_cast<std::uint32_t>(value));
+    for (const auto* values : {&compression, &squares})
+      for (const float value : *values) all.push_back(std::bit_cast<std::uint32_t>(value));
+    return all;
+  }
+};
+FloatResults run_float(const Sample& s, Simd simd, std::size_t grain = 64) {
+  const std::size_t n = s.size();
+  FloatPairs pairs;
+  pairs.build(s.system, simd);
+  std::vector<FloatPairs::Vector> v(n);
+  for (std::size_t i = 0; i < n; ++i) v[i] = {static_cast<float>(s.v[i].x()), static_cast<float>(s.v[i].y()), static_cast<float>(s.v[i].z()), 0};
+  FloatResults r{std::vector<FloatPairs::Vector>(n), std::vector<FloatPairs::Vector>(n), std::vector<float>(n), std::vector<float>(n)};
+  for (std::size_t i = 0; i < n; ++i) pairs.set(i, static_cast<float>(s.q[i]));
+  parallel_ranges(n, grain, [&](std::size_t begin, std::size_t end) {
+    pairs.gradient(begin, end, r.gradient);
+    pairs.divergence(begin, end, v, r.compression);
+  });
+  for (std::size_t i = 0; i < n; ++i) pairs.set(i, static_cast<float>(s.weight[i]));
+  parallel_ranges(n, grain, [&](std::size_t begin, std::size_t end) { pairs.compliance(begin, end, r.own, r.squares); });
+  return r;
+}
+
+TEST_P(PairKernelsTest, InSinglePrecisionAgreesWithDoubleToSixDigits) {
+  const Sample s(GetParam());
+  const Results exact = run(s, best_simd());
+  const FloatResults got = run_float(s, best_simd());
+  const Real V = s.system.volume();
+  with_kernel(s.system, [&](const auto& kernel, auto periodic) {
+    for (std::size_t i = 0; i < s.size(); ++i) {
+      Real compression_size = 0, slope_size = 0, gradient_size = 0;
+      for (const Index j : s.neighbors[i]) {
+        const Real r = s.system.template separation<decltype(periodic)::value>(i, j).norm(), F = r > 0 ? std::abs(kernel.dW(r) / r) : 0;
+        // A position off by 2^-22 supports counts by its share of a distance, and of the way to the support.
+        const Real size = V * F * (r + kSupport);
+        compression_size += size * (s.v[i] - s.v[j]).norm();
+        slope_size += size;
+        gradient_size += size * (std::abs(s.q[i]) + std::abs(s.q[j]));
+      }
+      constexpr Real kSix = 1e-6;
+      const auto vec = [](const FloatPairs::Vector& a) { return Vec3(a.x, a.y, a.z); };
+      ASSERT_LE((vec(got.gradient[i]) - exact.gradient[i]).norm(), kSix * gradient_size) << i;
+      ASSERT_LE((vec(got.own[i]) - exact.own[i]).norm(), kSix * slope_size) << i;
+      ASSERT_NEAR(got.compression[i], exact.compression[i], kSix * compression_size) << i;
+      ASSERT_NEAR(got.squares[i], exact.squares[i], 1e-5 * exact.squares[i]) << i;
+    }
+  });
+}
+
+TEST_P(PairKernelsTest, InSinglePrecisionGivesTheSameBitsOnEveryInstructionSetRangeAndNumberOfThreads) {
+  const Sample s(GetParam());
+  const auto one = [&] {
+    const ThreadLimit limit(1);
+    return run_float(s, Simd::kScalar, s.size()).bits();
+  }();
+  for (const Simd simd : simds())
+    for (const std::size_t grain : {1, 7, 100}) EXPECT_EQ(run_float(s, simd, grain).bits(), one) << "simd " << static_cast<int>(simd) << ", ranges of " << grain;
+}
+
+TEST_P(PairKernelsTest, InSinglePrecisionTwoParticlesPushOneAnotherEquallyHard) {
+  // To the last bit: the system's operators stay transposes of one another.
+  const Sample s(GetParam());
+  for (const std::size_t a : {0, 60, 200}) {
+    for (const Index b : s.neighbors[a]) {
+      Sample two(GetParam());
+      two.x = {s.x[a], s.x[b]};
+      two.system.x = two.x;
+      // Each is the other's only neighbour, whatever image is the nearest.
+      std::vector<Vec3> near = two.x;
+      two.grid.build(near, 10 * kSupport + (near[0] - near[1]).norm());
+      two.neighbors.find(two.grid, two.grid.cell());
+      FloatPairs pairs;
+      pairs.build(two.system);
+      pairs.set(0, 3.7f);
+      pairs.set(1, 1.3f);
+      std::vector<FloatPairs::Vector> out(2);
+      pairs.gradient(0, 2, out);
+      EXPECT_EQ(out[0].x, -out[1].x);
+      EXPECT_EQ(out[0].y, -out[1].y);
+      EXPECT_EQ(out[0].z, -out[1].z);
+    }
   }
 }
 INSTANTIATE_TEST_SUITE_P(Setups, PairKernelsTest, testing::ValuesIn(kSetups));

@@ -106,7 +106,7 @@ INSTANTIATE_TEST_SUITE_P(Systems, PressureOperators,
                                          Setup{"periodic", KernelKind::kWendlandC2, true, false}, Setup{"periodic with walls", KernelKind::kCubicSpline, true, true},
                                          Setup{"cubic spline", KernelKind::kCubicSpline, false, false}));
 
-TEST(PressureOperators, AWallSeesTheVelocityAgainstItsOwn) {
+TEST(PressureAtWalls, AWallSeesTheVelocityAgainstItsOwn) {
   SampleSystem s(lattice_block(6, 6, 4, 1), 1);
   const Vec3 speed(0.2, 0, 0.7);
   s.solids = {plane_solid(Vec3::Zero(), Vec3::UnitZ(), speed)};
