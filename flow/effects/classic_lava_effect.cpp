@@ -65,8 +65,8 @@ class ClassicLavaEffect final : public Effect {
             {"max_temperature_K", last_.max_temperature}};
   }
   std::string status() const override {
-    return fmt::format("{} particles, {:.1f} m/s, {:.0f} degC, dt {:.1f} ms", lava_.size(), last_.max_speed, lava_.size() > 0 ? last_.min_temperature - kZeroCelsius : 0,
-                       1e3 * last_.dt);
+    return fmt::format("{} particles, {:.1f} m/s, {:.0f} degC, dt {:.1f} ms", lava_.size(), last_.max_speed,
+                       lava_.size() > 0 ? last_.min_temperature - kZeroCelsius : 0, 1e3 * last_.dt);
   }
 
  private:
@@ -109,10 +109,13 @@ LavaModel read_classic_lava(Parameters& p) {
   o.support = p.number("support", "", o.support, {1.5, 4}, "radius of the kernel, in spacings");
   o.kernel = static_cast<sph::KernelKind>(p.choice("kernel", names(sph::kKernelNames), 0, "smoothing kernel"));
   o.density = p.number("density", "kg/m3", o.density, positive, "at rest");
-  o.stiffness = p.number("stiffness", "m2/s2", o.stiffness, positive, "k in P = k (rho - rho0): speed of sound squared; stiffer is less compressible and slower");
+  o.stiffness = p.number("stiffness", "m2/s2", o.stiffness, positive,
+                         "k in P = k (rho - rho0): speed of sound squared; stiffer is less compressible and slower");
   o.cohesion = p.number("cohesion", "", o.cohesion, {0, 1}, "of negative pressure: 1 as the state equation says");
-  o.density_diffusion = p.number("density_diffusion", "", o.density_diffusion, {0, 0.5}, "smooths the noise of the continuity equation; 0 is the paper's");
-  o.density_relaxation = p.number("density_relaxation", "", o.density_relaxation, {0, 1}, "pull of the density to the one summed over neighbours; 0 is the paper's");
+  o.density_diffusion =
+      p.number("density_diffusion", "", o.density_diffusion, {0, 0.5}, "smooths the noise of the continuity equation; 0 is the paper's");
+  o.density_relaxation = p.number("density_relaxation", "", o.density_relaxation, {0, 1},
+                                  "pull of the density to the one summed over neighbours; 0 is the paper's");
   Parameters viscosity = p.table("viscosity", "kinematic, nu(T) = b exp(-a T) through two points");
   auto& law = o.viscosity;
   law.hot_nu = viscosity.number("hot", "m2/s", law.hot_nu, positive, "at hot_temperature");
@@ -131,8 +134,10 @@ LavaModel read_classic_lava(Parameters& p) {
   o.scheme = static_cast<Scheme>(p.choice("scheme", names(kSchemeNames), 1, "time integration"));
   o.courant = p.number("courant", "", o.courant, {0, 2, true}, "of the step: share of the time sound takes over half the support");
   o.max_step = p.number("max_step", "s", o.max_step, positive, "no step is longer");
-  o.surface.mass_quotient = p.number("surface_mass_quotient", "", o.surface.mass_quotient, {0, 1}, "on the surface below this share of mass in the outer half-space");
-  o.surface.coplanarity = p.number("surface_coplanarity", "", o.surface.coplanarity, {0, 1}, "on the surface when the neighbours are this flat");
+  o.surface.mass_quotient = p.number("surface_mass_quotient", "", o.surface.mass_quotient, {0, 1},
+                                     "on the surface below this share of mass in the outer half-space");
+  o.surface.coplanarity =
+      p.number("surface_coplanarity", "", o.surface.coplanarity, {0, 1}, "on the surface when the neighbours are this flat");
   o.rest_period = p.number("rest_period", "s", o.rest_period, not_negative, "material coordinates are renewed this often; 0: never");
   if (o.rest_period > 0 && o.rest_period < 1e-3) p.fault("rest_period", "must be 0 s, or at least 0.001 s");
 

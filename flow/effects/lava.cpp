@@ -17,24 +17,30 @@ constexpr Real kMostParticles = 1e9, kMostSites = 1e6, kMostSteps = 1e9;
 
 /// A scene of the other model is told so, once; its parameters are unknown here.
 void tell_of_the_other_model(Parameters& p, bool modern) {
-  static constexpr const char* kClassic[] = {"viscosity", "stiffness", "air_exchange", "ground_exchange", "air_temperature", "ground_friction", "heat_capacity", "diffusivity", "cohesion"};
+  static constexpr const char* kClassic[] = {"viscosity",       "stiffness",     "air_exchange", "ground_exchange", "air_temperature",
+                                             "ground_friction", "heat_capacity", "diffusivity",  "cohesion"};
   static constexpr const char* kModern[] = {"preset", "rheology", "heat", "crust_viscosity", "slip_length"};
   const auto tell = [&](const auto& keys, const char* other) {
     for (const char* key : keys) {
       if (!p.has(key)) continue;
-      p.fault(key, fmt::format("is of the {0} model; this lava's model is {1}: model = \"{0}\" would do", other, modern ? "modern" : "classic"));
+      p.fault(key,
+              fmt::format("is of the {0} model; this lava's model is {1}: model = \"{0}\" would do", other, modern ? "modern" : "classic"));
       return;
     }
   };
-  if (modern) tell(kClassic, "classic");
-  else tell(kModern, "modern");
+  if (modern)
+    tell(kClassic, "classic");
+  else
+    tell(kModern, "modern");
 }
 
 }  // namespace
 
 EffectPlan read_lava(Parameters& p, Real duration) {
-  const bool modern = p.choice("model", {"modern", "classic"}, 0,
-                               "the equations: modern has implicit pressure and viscosity, real rheology, heat and crust; classic is Stora et al. 1999") == 0;
+  const bool modern =
+      p.choice("model", {"modern", "classic"}, 0,
+               "the equations: modern has implicit pressure and viscosity, real rheology, heat and crust; classic is Stora et al. 1999") ==
+      0;
   const LavaModel model = modern ? read_modern_lava(p) : read_classic_lava(p);
   tell_of_the_other_model(p, modern);
   const std::vector<PlannedVent> vents = read_vents(p, model.vent_temperature);
@@ -46,11 +52,18 @@ EffectPlan read_lava(Parameters& p, Real duration) {
     const Real widest = most_sites(vents, model.spacing);
     // Negated: what is not a number is too many as well.
     if (!(plan.estimate.particles <= kMostParticles)) {
-      p.fault("spacing", fmt::format("the vents' rates would make {:.3g} particles of this size, at most {:.0e}: a larger spacing or a smaller rate would do", plan.estimate.particles, kMostParticles));
+      p.fault("spacing",
+              fmt::format(
+                  "the vents' rates would make {:.3g} particles of this size, at most {:.0e}: a larger spacing or a smaller rate would do",
+                  plan.estimate.particles, kMostParticles));
     } else if (!(widest <= kMostSites)) {
-      p.fault("spacing", fmt::format("the widest vent would have {:.3g} particles side by side, at most {:.0e}: a larger spacing or a narrower vent would do", widest, kMostSites));
+      p.fault("spacing",
+              fmt::format(
+                  "the widest vent would have {:.3g} particles side by side, at most {:.0e}: a larger spacing or a narrower vent would do",
+                  widest, kMostSites));
     } else if (!(plan.estimate.steps <= kMostSteps)) {
-      p.fault("", fmt::format("the film covers {:.3g} s, {:.3g} steps, at most {:.0e}: look at film.time_scale, film.fps, {}", duration, plan.estimate.steps, kMostSteps, model.sets_the_step));
+      p.fault("", fmt::format("the film covers {:.3g} s, {:.3g} steps, at most {:.0e}: look at film.time_scale, film.fps, {}", duration,
+                              plan.estimate.steps, kMostSteps, model.sets_the_step));
     }
   }
   plan.misfits = [vents](const World& world) {

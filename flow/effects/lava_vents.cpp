@@ -27,7 +27,9 @@ PlannedVent read_vent(Parameters& p, Real temperature) {
     planned.from = point("from", true, "one end of a fissure, in the terrain file's coordinates");
     planned.to = point("to", true, "its other end");
     point("at", false, "not with a fissure");
-    if (p.has("at")) p.fault("at", "found with 'from' and 'to', wanted one or the other: a crater vent is 'at' a point, a fissure runs 'from' one 'to' another");
+    if (p.has("at"))
+      p.fault("at",
+              "found with 'from' and 'to', wanted one or the other: a crater vent is 'at' a point, a fissure runs 'from' one 'to' another");
   } else {
     planned.from = planned.to = point("at", true, "centre of a round vent, in the terrain file's coordinates");
   }
@@ -65,7 +67,8 @@ Real mean_let_out(const std::vector<PlannedVent>& vents, Real t) {
 
 Real most_sites(const std::vector<PlannedVent>& vents, Real spacing) {
   Real most = 0;
-  for (const PlannedVent& v : vents) most = std::max(most, (std::max((v.to - v.from).norm(), v.vent.width) / spacing + 1) * (v.vent.width / spacing + 1));
+  for (const PlannedVent& v : vents)
+    most = std::max(most, (std::max((v.to - v.from).norm(), v.vent.width) / spacing + 1) * (v.vent.width / spacing + 1));
   return most;
 }
 
@@ -79,8 +82,10 @@ std::vector<Vent> place_vents(const std::vector<PlannedVent>& vents, const geome
       const Vec2 local = map - origin;
       const std::optional<Real> z = terrain.height(local.x(), local.y());
       if (!z)
-        faults.push_back({planned.place, fmt::format("the vent at {:.12g}, {:.12g} is not on the terrain, which runs from {:.12g}, {:.12g} to {:.12g}, {:.12g}", map.x(), map.y(),
-                                                     low.x(), low.y(), high.x(), high.y())});
+        faults.push_back(
+            {planned.place,
+             fmt::format("the vent at {:.12g}, {:.12g} is not on the terrain, which runs from {:.12g}, {:.12g} to {:.12g}, {:.12g}",
+                         map.x(), map.y(), low.x(), low.y(), high.x(), high.y())});
       return Vec3(local.x(), local.y(), z.value_or(0));
     };
     Vent vent = planned.vent;
@@ -99,7 +104,9 @@ std::vector<Vent> place_whole_vents(const std::vector<PlannedVent>& vents, const
     const std::vector<Vec3> sites = placed[v].lattice(spacing);
     for (const Vec3& site : sites) beside += !terrain.height(site.x(), site.y());
     if (beside > 0)
-      faults.push_back({vents[v].place, fmt::format("{} of the vent's {} sites are not on the terrain: it reaches over the edge or a hole, wanted a narrower vent or one further in", beside, sites.size())});
+      faults.push_back({vents[v].place, fmt::format("{} of the vent's {} sites are not on the terrain: it reaches over the edge or a hole, "
+                                                    "wanted a narrower vent or one further in",
+                                                    beside, sites.size())});
   }
   if (!faults.empty()) throw InputError(faults);
   return placed;

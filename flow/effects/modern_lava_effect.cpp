@@ -101,8 +101,13 @@ class ModernLavaEffect final : public Effect {
       figures.emplace_back("max_temperature_K", parallel_max(T.size(), 0, [&](std::size_t i) { return T[i]; }));
     }
     if (heat_) {
-      for (const auto& [key, value] : {std::pair("radiated_J", t.radiated), {"convected_J", t.convected}, {"ground_J", t.ground}, {"vent_J", t.vent},
-                                       {"viscous_J", t.viscous}, {"stored_J", t.stored}, {"left_J", t.left}})
+      for (const auto& [key, value] : {std::pair("radiated_J", t.radiated),
+                                       {"convected_J", t.convected},
+                                       {"ground_J", t.ground},
+                                       {"vent_J", t.vent},
+                                       {"viscous_J", t.viscous},
+                                       {"stored_J", t.stored},
+                                       {"left_J", t.left}})
         figures.emplace_back(key, value);
     }
     return figures;
@@ -193,25 +198,35 @@ void read_heat(Parameters p, const LavaPreset* preset, bool on, HeatOptions& h) 
     h.air.convection = preset->convection;
   }
   h.air.air_temperature = 288.15;
-  h.on = p.flag("on", on, "false: every particle keeps its temperature, nothing is computed; true when there is a preset or a table [lava.heat]");
+  h.on = p.flag("on", on,
+                "false: every particle keeps its temperature, nothing is computed; true when there is a preset or a table [lava.heat]");
   h.curve.heat_capacity = p.number("heat_capacity", "J/(kg K)", h.curve.heat_capacity, {1, 1e6}, "");
-  h.curve.latent_heat = p.number("latent_heat", "J/kg", h.curve.latent_heat, {0, 1e8}, "set free from liquidus to solidus, a kilogram of lava");
+  h.curve.latent_heat =
+      p.number("latent_heat", "J/kg", h.curve.latent_heat, {0, 1e8}, "set free from liquidus to solidus, a kilogram of lava");
   h.curve.solidus = p.number("solidus", "K", h.curve.solidus, kTemperature, "all of the latent heat is out below");
   h.curve.liquidus = p.number("liquidus", "K", h.curve.liquidus, kTemperature, "none of it is out above");
-  if (h.curve.liquidus < h.curve.solidus) p.fault(p.has("liquidus") ? "liquidus" : "solidus", fmt::format("the liquidus, {:g} K, is below the solidus, {:g} K", h.curve.liquidus, h.curve.solidus));
+  if (h.curve.liquidus < h.curve.solidus)
+    p.fault(p.has("liquidus") ? "liquidus" : "solidus",
+            fmt::format("the liquidus, {:g} K, is below the solidus, {:g} K", h.curve.liquidus, h.curve.solidus));
   h.conductivity = p.number("conductivity", "W/(m K)", h.conductivity, {0, 1e4, true}, "of the melt, its bubbles included");
   h.solid_conductivity = p.number("solid_conductivity", "W/(m K)", h.solid_conductivity, {0, 1e4}, "of the solid; 0: as the melt");
-  h.air.thompson_ramsey = p.choice("emissivity_law", {"constant", "thompson_ramsey"}, 0, "of temperature: thompson_ramsey is 1.0463 - 1.48144e-4 T (2021)") == 1;
+  h.air.thompson_ramsey = p.choice("emissivity_law", {"constant", "thompson_ramsey"}, 0,
+                                   "of temperature: thompson_ramsey is 1.0463 - 1.48144e-4 T (2021)") == 1;
   h.air.emissivity = p.number("emissivity", "", h.air.emissivity, {0, 1}, "of law constant");
-  h.air.convection = p.number("convection", "W/(m2 K)", h.air.convection, {0, 1e6}, "heat transfer to the air; figures in use range from 9 to 75");
+  h.air.convection =
+      p.number("convection", "W/(m2 K)", h.air.convection, {0, 1e6}, "heat transfer to the air; figures in use range from 9 to 75");
   h.air.air_temperature = p.number("air_temperature", "K", h.air.air_temperature, kTemperature, "of air and sky");
   // Effusivity's own unit has a root in it, which units here have not. Soil: 2 W/(m K) and 2.2 MJ/(m3 K).
-  const Real k = p.number("ground_conductivity", "W/(m K)", 2, {0, 1e4}, "of the ground, which warms up under the lava; its temperature is terrain.temperature; 0: insulates");
+  const Real k = p.number("ground_conductivity", "W/(m K)", 2, {0, 1e4},
+                          "of the ground, which warms up under the lava; its temperature is terrain.temperature; 0: insulates");
   const Real rho_c = p.number("ground_heat_capacity", "J/(m3 K)", 2.2e6, {1, 1e9}, "of a cubic metre of ground");
   h.ground_effusivity = std::sqrt(k * rho_c);
-  h.ground_conductance = p.number("ground_conductance", "W/(m2 K)", h.ground_conductance, {0, 1e6}, "of a plate in the ground's place, its far side at the ground's temperature; 0: none");
+  h.ground_conductance = p.number("ground_conductance", "W/(m2 K)", h.ground_conductance, {0, 1e6},
+                                  "of a plate in the ground's place, its far side at the ground's temperature; 0: none");
   h.viscous_heating = p.flag("viscous_heating", h.viscous_heating, "friction inside the lava warms it");
-  h.crust = p.flag("crust", h.crust, "a conductive column on each exposed particle: what glows is its thin skin; false: each particle cools and glows as a whole");
+  h.crust =
+      p.flag("crust", h.crust,
+             "a conductive column on each exposed particle: what glows is its thin skin; false: each particle cools and glows as a whole");
   h.crust_temperature = p.number("crust_temperature", "K", h.crust_temperature, kTemperature, "what is colder is crust");
   h.longest_interval = p.number("longest_interval", "s", h.longest_interval, not_negative, "between two exchanges among particles");
 }
@@ -269,38 +284,50 @@ LavaModel read_modern_lava(Parameters& p) {
   ModernOptions o;
   std::vector<std::string> presets = {"none"};
   for (const std::string& name : sph::lava_preset_names()) presets.push_back(name);
-  const std::size_t chosen = p.choice("preset", presets, 0, "a real lava: the defaults of rheology, density, heat and the vents' temperature");
+  const std::size_t chosen =
+      p.choice("preset", presets, 0, "a real lava: the defaults of rheology, density, heat and the vents' temperature");
   const LavaPreset* preset = chosen > 0 ? sph::find_lava_preset(presets[chosen]) : nullptr;
 
   const auto positive = Parameters::positive(), not_negative = Parameters::not_negative();
   o.spacing = p.number("spacing", "m", std::nullopt, positive, "between particles at rest: the resolution");
-  o.support = p.number("support", "", o.support, {1.5, 4}, "radius of the kernel, in spacings: 3 is right to some per cent, 2 three times as fast and 20 % off");
-  o.kernel = static_cast<sph::KernelKind>(p.choice("kernel", names(sph::kKernelNames), static_cast<std::size_t>(o.kernel), "smoothing kernel of density and pressure"));
+  o.support = p.number("support", "", o.support, {1.5, 4},
+                       "radius of the kernel, in spacings: 3 is right to some per cent, 2 three times as fast and 20 % off");
+  o.kernel = static_cast<sph::KernelKind>(
+      p.choice("kernel", names(sph::kKernelNames), static_cast<std::size_t>(o.kernel), "smoothing kernel of density and pressure"));
   o.density = p.number("density", "kg/m3", preset ? preset->density : o.density, {1, 1e5}, "bubbles included");
   o.rheology = read_rheology(p, preset);
   read_heat(p.table("heat", "what the lava loses, and to what"), preset, preset || p.has("heat"), o.heat);
-  o.crust_viscosity = p.number("crust_viscosity", "Pa s", o.crust_viscosity, {0, 1e15}, "of crust; its share of a particle's thickness adds this to the viscosity; 0: crust does not stiffen");
+  o.crust_viscosity = p.number("crust_viscosity", "Pa s", o.crust_viscosity, {0, 1e15},
+                               "of crust; its share of a particle's thickness adds this to the viscosity; 0: crust does not stiffen");
   o.crust_strength = p.number("crust_strength", "Pa", o.crust_strength, {0, 1e9}, "stress at which crust gives; 0: it never does");
-  o.slip_length = p.number("slip_length", "m", o.slip_length, not_negative, "on the ground: 0 is no slip, far more than the lava's depth free slip");
-  o.courant = p.number("courant", "", o.courant, {0, 2, true}, "of the step: share of the time in which the fastest particle moves one spacing");
+  o.slip_length =
+      p.number("slip_length", "m", o.slip_length, not_negative, "on the ground: 0 is no slip, far more than the lava's depth free slip");
+  o.courant =
+      p.number("courant", "", o.courant, {0, 2, true}, "of the step: share of the time in which the fastest particle moves one spacing");
   o.max_step = p.number("max_step", "s", o.max_step, positive, "no step is longer");
   o.min_step = p.number("min_step", "s", o.min_step, positive, "a run that would need a shorter one ends");
-  o.divergence_tolerance = p.number("divergence_tolerance", "", o.divergence_tolerance, kTolerance, "of the pressure solve: change of density a step may leave, rms");
+  o.divergence_tolerance = p.number("divergence_tolerance", "", o.divergence_tolerance, kTolerance,
+                                    "of the pressure solve: change of density a step may leave, rms");
   o.density_tolerance = p.number("density_tolerance", "", o.density_tolerance, kTolerance, "of taking compression back, rms");
-  o.density_iterations = static_cast<int>(p.integer("density_iterations", o.density_iterations, 1, 1000000, "of that, at most: it goes on in the next step"));
-  o.viscosity_tolerance = p.number("viscosity_tolerance", "", o.viscosity_tolerance, {0, 1e-2, true}, "of the viscosity solve: residual over right-hand side");
+  o.density_iterations =
+      static_cast<int>(p.integer("density_iterations", o.density_iterations, 1, 1000000, "of that, at most: it goes on in the next step"));
+  o.viscosity_tolerance =
+      p.number("viscosity_tolerance", "", o.viscosity_tolerance, {0, 1e-2, true}, "of the viscosity solve: residual over right-hand side");
   o.max_iterations = static_cast<int>(p.integer("max_iterations", o.max_iterations, 1, 1000000, "of either solve"));
   o.coupling = static_cast<int>(p.integer("coupling", o.coupling, 1, 20, "pressure and viscosity are solved this often a step"));
-  const Real pace = p.number("sleep_pace", "s", 3600, not_negative, "lava that would take longer than this to move one spacing falls asleep; 0: never");
+  const Real pace =
+      p.number("sleep_pace", "s", 3600, not_negative, "lava that would take longer than this to move one spacing falls asleep; 0: never");
   o.sleep_speed = pace > 0 ? o.spacing / pace : 0;
   o.sleep_delay = p.number("sleep_delay", "s", o.sleep_delay, not_negative, "once it has been that slow for so long");
   o.rest_period = p.number("rest_period", "s", o.rest_period, not_negative, "material coordinates are renewed this often; 0: never");
   if (o.rest_period > 0 && o.rest_period < 1e-3) p.fault("rest_period", "must be 0 s, or at least 0.001 s");
 
-  const Real diffusion = std::max(o.heat.conductivity, o.heat.solid_conductivity) / (o.density * o.heat.curve.heat_capacity) * o.max_step / (o.spacing * o.spacing);
+  const Real diffusion = std::max(o.heat.conductivity, o.heat.solid_conductivity) / (o.density * o.heat.curve.heat_capacity) * o.max_step /
+                         (o.spacing * o.spacing);
   if (o.spacing > 0 && o.heat.on && !(diffusion <= kMostDiffusion))
-    p.fault("spacing", fmt::format("heat would cross {:.3g} particles of this size in a step, at most {:.0f}: a larger spacing, a smaller max_step or heat.conductivity would do", std::sqrt(diffusion),
-                                   std::sqrt(kMostDiffusion)));
+    p.fault("spacing", fmt::format("heat would cross {:.3g} particles of this size in a step, at most {:.0f}: a larger spacing, a smaller "
+                                   "max_step or heat.conductivity would do",
+                                   std::sqrt(diffusion), std::sqrt(kMostDiffusion)));
 
   LavaModel model;
   model.spacing = o.spacing;

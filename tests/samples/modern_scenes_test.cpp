@@ -57,7 +57,7 @@ TEST_F(ModernScene, InTheGullyLavaRunsDownCoolsAndLosesNothing) {
   EXPECT_EQ(f.at("mass_left_kg"), 0);
   EXPECT_EQ(f.at("mass_present_kg"), f.at("mass_emitted_kg"));
   EXPECT_NEAR(f.at("volume_m3"), 8 * 29, 15) << "rate, 30 s less a ramp at each end; to one particle a site";
-  EXPECT_LT(front, 30) << "more than half way down from y = 46";
+  EXPECT_LT(front, 30) << "13 m down from y = 43";
   const double lost = f.at("radiated_J") + f.at("convected_J") + f.at("ground_J");
   EXPECT_GT(lost, 1e8);
   EXPECT_NEAR((f.at("vent_J") + f.at("viscous_J") - f.at("stored_J") - f.at("left_J")) / lost, 1, 1e-6);
@@ -76,7 +76,8 @@ TEST_F(ModernScene, InTheGullyLavaRunsDownCoolsAndLosesNothing) {
 TEST_F(ModernScene, TheResolvedSceneOfMaungaWhauReadsBack) {
   load("maunga-whau-modern.toml", {"lava.spacing=4 m"}, 1);
   const std::string resolved = loaded_->resolved, key = loaded_->key;
-  const std::filesystem::path file = std::filesystem::temp_directory_path() / ("effuse.resolved." + std::to_string(std::hash<std::string>()(resolved)) + ".toml");
+  const std::filesystem::path file =
+      std::filesystem::temp_directory_path() / ("effuse.resolved." + std::to_string(std::hash<std::string>()(resolved)) + ".toml");
   write_file(file, resolved);
   loaded_ = load_scene(file, {}, 0);
   std::filesystem::remove(file);

@@ -128,7 +128,7 @@ frames = "ten"
 file = "nowhere.asc"
 [lava]
 spacing = "2 kg"
-viscsity = { hot = 1 }
+crust_viscsity = "1e8 Pa s"
 [[lava.vent]]
 at = [10, 10]
 width = "4 m"

@@ -40,7 +40,8 @@ std::unique_ptr<Loaded> load(const fs::path& file, const std::vector<std::string
   loaded->scene = flow::read_scene(root, flow::effect_kinds());
   if (!root.faults().empty()) throw InputError(root.faults());
   const flow::Scene& scene = loaded->scene;
-  loaded->terrain = importers::import_terrain(file.parent_path() / scene.terrain_file, {scene.ground_temperature, scene.terrain_crs}).terrain;
+  loaded->terrain =
+      importers::import_terrain(file.parent_path() / scene.terrain_file, {scene.ground_temperature, scene.terrain_crs}).terrain;
   loaded->simulation = std::make_unique<flow::Simulation>(scene, flow::World{&*loaded->terrain, scene.seed});
   return loaded;
 }
@@ -49,7 +50,9 @@ std::unique_ptr<Loaded> load(const fs::path& file, const std::vector<std::string
 Real release_height(const flow::Node& root, const geometry::Terrain& terrain, Real spacing) {
   const flow::Node& vent = root.find("lava")->find("vent")->items.at(0);
   const auto end = [&](const char* key) {
-    const auto coordinate = [&](const flow::Node& node) { return node.kind == flow::Node::Kind::kInteger ? static_cast<Real>(node.integer) : node.real; };
+    const auto coordinate = [&](const flow::Node& node) {
+      return node.kind == flow::Node::Kind::kInteger ? static_cast<Real>(node.integer) : node.real;
+    };
     const flow::Node& point = *vent.find(key);
     return Vec2(Vec2(coordinate(point.items.at(0)), coordinate(point.items.at(1))) - terrain.georeference().origin.head<2>());
   };
@@ -75,12 +78,15 @@ Real let_out(const flow::Node& root, Real t) {
 
 // The sample scene on coarse particles, its vent open for two of five minutes.
 CaseResult maunga_whau() {
-  const auto loaded = load(scenes() / "maunga-whau-modern.toml", {"lava.spacing=1.5 m", "lava.vent[0].rate=140 m3/s", "lava.vent[0].width=3 m", "lava.vent[0].stop=120 s", "lava.vent[0].ramp=10 s", "film.fps=1", "film.time_scale=5", "film.frames=60"});
+  const auto loaded = load(scenes() / "maunga-whau-modern.toml",
+                           {"lava.spacing=1.5 m", "lava.vent[0].rate=140 m3/s", "lava.vent[0].width=3 m", "lava.vent[0].stop=120 s",
+                            "lava.vent[0].ramp=10 s", "film.fps=1", "film.time_scale=5", "film.frames=60"});
   flow::Simulation& simulation = *loaded->simulation;
   const flow::Effect& lava = *simulation.effects().front();
 
   Curve released{"let out by the vent", {}, {}, false, true}, present{"in particles, and over the edge", {}, {}, true, false};
-  Curve missing{"brought, and gained by friction, less what is stored", {}, {}, false, true}, lost{"lost to sky, air and ground", {}, {}, true, false};
+  Curve missing{"brought, and gained by friction, less what is stored", {}, {}, false, true},
+      lost{"lost to sky, air and ground", {}, {}, true, false};
   Curve sky{"radiated", {}, {}, false, false}, air{"convected", {}, {}, false, false}, ground{"into the ground", {}, {}, false, false};
   std::map<std::string, double> f;
   double worst_volume = 0, worst_energy = 0, deepest = 0;
@@ -90,16 +96,19 @@ CaseResult maunga_whau() {
     for (const auto& [name, value] : lava.figures()) f[name] = value;
     const Real t = simulation.time();
 
-    const double volume = (f["mass_present_kg"] + f["mass_left_kg"]) / f["mass_present_kg"] * f["volume_m3"], wanted = let_out(loaded->root, t);
+    const double volume = (f["mass_present_kg"] + f["mass_left_kg"]) / f["mass_present_kg"] * f["volume_m3"],
+                 wanted = let_out(loaded->root, t);
     released.x.push_back(t), present.x.push_back(t);
     released.y.push_back(wanted), present.y.push_back(volume);
     // Before, a vent's staggered particles are a coarse measure.
     if (t >= 120) worst_volume = std::max(worst_volume, std::abs(volume / wanted - 1));
 
-    const double gone = f["vent_J"] + f["viscous_J"] - f["stored_J"] - f["left_J"], losses = f["radiated_J"] + f["convected_J"] + f["ground_J"];
+    const double gone = f["vent_J"] + f["viscous_J"] - f["stored_J"] - f["left_J"],
+                 losses = f["radiated_J"] + f["convected_J"] + f["ground_J"];
     if (losses > 0) worst_energy = std::max(worst_energy, std::abs(gone / losses - 1));
     for (Curve* c : {&missing, &lost, &sky, &air, &ground}) c->x.push_back(t);
-    missing.y.push_back(gone), lost.y.push_back(losses), sky.y.push_back(f["radiated_J"]), air.y.push_back(f["convected_J"]), ground.y.push_back(f["ground_J"]);
+    missing.y.push_back(gone), lost.y.push_back(losses), sky.y.push_back(f["radiated_J"]), air.y.push_back(f["convected_J"]),
+        ground.y.push_back(f["ground_J"]);
 
     const geometry::Points points = lava.points();
     most = std::max(most, points.size());
@@ -123,25 +132,31 @@ CaseResult maunga_whau() {
   }
 
   CaseResult result;
-  result.measures = {compared("present and left against rate and time, worst from 120 s on", "m3", present.y.back(), released.y.back(), 1e-3),
-                     bounded("particles under the ground, all frames", static_cast<Real>(under_ground), 0, "particles"),
-                     compared("heat lost against heat missing, worst of all frames", "J", lost.y.back(), missing.y.back(), 0.01),
-                     compared("friction and motion against the fall", "J", f["viscous_J"] + moving, fallen, 0.01)};
+  result.measures = {
+      compared("present and left against rate and time, worst from 120 s on", "m3", present.y.back(), released.y.back(), 1e-3),
+      bounded("particles under the ground, all frames", static_cast<Real>(under_ground), 0, "particles"),
+      compared("heat lost against heat missing, worst of all frames", "J", lost.y.back(), missing.y.back(), 0.01),
+      compared("friction and motion against the fall", "J", f["viscous_J"] + moving, fallen, 0.01)};
   result.measures[0].error = worst_volume;
   result.measures[2].error = worst_energy;
   result.plots = {{"maunga_whau_volume", "Maunga Whau: volume", "time [s]", "volume [m3]", false, false, {released, present}},
                   {"maunga_whau_heat", "Maunga Whau: heat lost", "time [s]", "heat [J]", false, false, {missing, lost, sky, air, ground}}};
-  result.note = fmt::format("{} particles of 1.5 m on the mountain's 10 m cells, {:.0f} steps, {:.0f} tried again; {:.0f} pressure and {:.0f} viscosity iterations a step; of the fall {:.2g} % is in motion; "
-                            "compression {:.2g} rms at the end, {:.2g} at worst; {:.3g} kg left over the edge{}{}.",
-                            most, f["steps"], f["retries"], f["pressure_iterations"], f["viscosity_iterations"], 100 * moving / fallen, f["density_error"], f["largest_density_error"], f["mass_left_kg"],
-                            beside > 0 ? fmt::format(", {} times a particle was seen beside the terrain on its way out", beside) : "", under_ground > 0 ? fmt::format(", deepest {:.3g} m under the ground", deepest) : "");
+  result.note = fmt::format(
+      "{} particles of 1.5 m on the mountain's 10 m cells, {:.0f} steps, {:.0f} tried again; {:.0f} pressure and {:.0f} viscosity "
+      "iterations a step; of the fall {:.2g} % is in motion; "
+      "compression {:.2g} rms at the end, {:.2g} at worst; {:.3g} kg left over the edge{}{}.",
+      most, f["steps"], f["retries"], f["pressure_iterations"], f["viscosity_iterations"], 100 * moving / fallen, f["density_error"],
+      f["largest_density_error"], f["mass_left_kg"],
+      beside > 0 ? fmt::format(", {} times a particle was seen beside the terrain on its way out", beside) : "",
+      under_ground > 0 ? fmt::format(", deepest {:.3g} m under the ground", deepest) : "");
   return result;
 }
 
 }  // namespace
 
 void add_terrain_cases(std::vector<Case>& cases) {
-  cases.push_back({"maunga_whau", "Volume and heat on Maunga Whau", "conservation; heights of R's volcano data set, samples/scenes/maunga-whau.asc", false, maunga_whau});
+  cases.push_back({"maunga_whau", "Volume and heat on Maunga Whau",
+                   "conservation; heights of R's volcano data set, samples/scenes/maunga-whau.asc", false, maunga_whau});
 }
 
 }  // namespace effuse::study

@@ -36,7 +36,8 @@ Read read(const Node& root) {
 
 /// A vent and a spacing, and what the test is about: that goes before.
 Read read(Lines lines) {
-  lines.insert(lines.begin(), {{"lava.spacing", "1 m"}, {"lava.vent[0].at", "[5, 5]"}, {"lava.vent[0].width", "3 m"}, {"lava.vent[0].rate", "2 m3/s"}});
+  lines.insert(lines.begin(),
+               {{"lava.spacing", "1 m"}, {"lava.vent[0].at", "[5, 5]"}, {"lava.vent[0].width", "3 m"}, {"lava.vent[0].rate", "2 m3/s"}});
   return read(scene_of(lines));
 }
 
@@ -88,7 +89,8 @@ TEST(ReadLava, APresetBringsDensityHeatRheologyAndTheVentsTemperature) {
 }
 
 TEST(ReadLava, WhatStandsInTheSceneGoesBeforeThePreset) {
-  const Read r = read({{"lava.preset", "etna"}, {"lava.density", "2000"}, {"lava.heat.convection", "70"}, {"lava.vent[0].temperature", "1050 degC"}});
+  const Read r =
+      read({{"lava.preset", "etna"}, {"lava.density", "2000"}, {"lava.heat.convection", "70"}, {"lava.vent[0].temperature", "1050 degC"}});
   EXPECT_EQ(r.faults, "");
   EXPECT_EQ(resolved_text(r.resolved, "lava.density"), "2000 kg/m3");
   EXPECT_EQ(resolved_text(r.resolved, "lava.heat.convection"), "70 W/(m2 K)");
@@ -115,14 +117,19 @@ TEST(ReadLava, WhatIsResolvedReadsTheSame) {
 
 TEST(ReadLava, EstimatesAreFiniteAndGrowWithResolution) {
   const auto estimate = [](const char* preset, const char* spacing) {
-    Lines lines = {{"lava.preset", preset}, {"lava.spacing", spacing}, {"lava.vent[0].at", "[5, 5]"}, {"lava.vent[0].width", "3 m"}, {"lava.vent[0].rate", "2 m3/s"}};
+    Lines lines = {{"lava.preset", preset},
+                   {"lava.spacing", spacing},
+                   {"lava.vent[0].at", "[5, 5]"},
+                   {"lava.vent[0].width", "3 m"},
+                   {"lava.vent[0].rate", "2 m3/s"}};
     return read(scene_of(lines)).plan.estimate;
   };
   for (const char* preset : {"none", "etna", "kilauea-mauna-ulu"}) {
     const Estimate coarse = estimate(preset, "1 m"), fine = estimate(preset, "0.5 m");
     EXPECT_NEAR(coarse.particles, 120, 1e-9);
     EXPECT_NEAR(fine.particles, 8 * coarse.particles, 1e-6);
-    for (const Estimate& e : {coarse, fine}) EXPECT_TRUE(e.steps > 0 && e.seconds > 0 && e.bytes > 0 && std::isfinite(e.steps + e.seconds + e.bytes)) << preset;
+    for (const Estimate& e : {coarse, fine})
+      EXPECT_TRUE(e.steps > 0 && e.seconds > 0 && e.bytes > 0 && std::isfinite(e.steps + e.seconds + e.bytes)) << preset;
     EXPECT_GT(fine.seconds, 8 * coarse.seconds);
   }
 }
@@ -142,23 +149,33 @@ TEST_P(ReadLavaFaults, AreTold) {
 
 INSTANTIATE_TEST_SUITE_P(
     , ReadLavaFaults,
-    testing::Values(Wrong{"model", {{"lava.model", "clasic"}}, "did you mean 'classic'?"}, Wrong{"preset", {{"lava.preset", "etnna"}}, "did you mean 'etna'?"},
-                    Wrong{"classic_parameter", {{"lava.stiffness", "900"}}, "lava.stiffness: is of the classic model"},
-                    Wrong{"modern_parameter", {{"lava.model", "classic"}, {"lava.preset", "etna"}}, "model = \"modern\" would do"},
-                    Wrong{"unknown_in_heat", {{"lava.heat.conductivty", "2"}}, "did you mean 'conductivity'?"},
-                    Wrong{"melting_range", {{"lava.heat.solidus", "1200 degC"}, {"lava.heat.liquidus", "1100 degC"}}, "lava.heat.liquidus: the liquidus, 1373.15 K, is below"},
-                    Wrong{"emissivity", {{"lava.heat.emissivity", "2"}}, "lava.heat.emissivity: 2 is out of range"},
-                    Wrong{"dimension", {{"lava.heat.ground_conductivity", "2 m2/s"}}, "lava.heat.ground_conductivity: "},
-                    Wrong{"tolerance", {{"lava.viscosity_tolerance", "0"}}, "lava.viscosity_tolerance: 0 is out of range"},
-                    Wrong{"coupling", {{"lava.coupling", "0"}}, "lava.coupling: 0 is out of range"},
-                    Wrong{"diffusion", {{"lava.heat.conductivity", "1e4"}, {"lava.density", "1"}, {"lava.heat.heat_capacity", "1"}, {"lava.max_step", "1e4 s"}}, "heat would cross"},
-                    Wrong{"particles", {{"lava.vent[0].start", "0 s"}, {"lava.vent[1].at", "[5, 5]"}, {"lava.vent[1].width", "3"}, {"lava.vent[1].rate", "1e12"}}, "particles of this size"},
-                    Wrong{"rest_period", {{"lava.rest_period", "1e-9 s"}}, "lava.rest_period: must be 0 s"}),
+    testing::Values(
+        Wrong{"model", {{"lava.model", "clasic"}}, "did you mean 'classic'?"},
+        Wrong{"preset", {{"lava.preset", "etnna"}}, "did you mean 'etna'?"},
+        Wrong{"classic_parameter", {{"lava.stiffness", "900"}}, "lava.stiffness: is of the classic model"},
+        Wrong{"modern_parameter", {{"lava.model", "classic"}, {"lava.preset", "etna"}}, "model = \"modern\" would do"},
+        Wrong{"unknown_in_heat", {{"lava.heat.conductivty", "2"}}, "did you mean 'conductivity'?"},
+        Wrong{"melting_range",
+              {{"lava.heat.solidus", "1200 degC"}, {"lava.heat.liquidus", "1100 degC"}},
+              "lava.heat.liquidus: the liquidus, 1373.15 K, is below"},
+        Wrong{"emissivity", {{"lava.heat.emissivity", "2"}}, "lava.heat.emissivity: 2 is out of range"},
+        Wrong{"dimension", {{"lava.heat.ground_conductivity", "2 m2/s"}}, "lava.heat.ground_conductivity: "},
+        Wrong{"tolerance", {{"lava.viscosity_tolerance", "0"}}, "lava.viscosity_tolerance: 0 is out of range"},
+        Wrong{"coupling", {{"lava.coupling", "0"}}, "lava.coupling: 0 is out of range"},
+        Wrong{"diffusion",
+              {{"lava.heat.conductivity", "1e4"}, {"lava.density", "1"}, {"lava.heat.heat_capacity", "1"}, {"lava.max_step", "1e4 s"}},
+              "heat would cross"},
+        Wrong{"particles",
+              {{"lava.vent[0].start", "0 s"}, {"lava.vent[1].at", "[5, 5]"}, {"lava.vent[1].width", "3"}, {"lava.vent[1].rate", "1e12"}},
+              "particles of this size"},
+        Wrong{"rest_period", {{"lava.rest_period", "1e-9 s"}}, "lava.rest_period: must be 0 s"}),
     [](const testing::TestParamInfo<Wrong>& i) { return std::string(i.param.name); });
 
 TEST(ReadLava, ToldFaultsAreAllOfThemAtOnce) {
-  const Read r = read({{"lava.support", "9"}, {"lava.heat.convection", "-1"}, {"lava.rheology.law", "vtf"}, {"lava.vent[0].start", "-2 s"}});
-  for (const char* key : {"lava.support", "lava.heat.convection", "lava.rheology.law", "lava.vent[0].start"}) EXPECT_TRUE(contains(r.faults, key)) << key << "\n" << r.faults;
+  const Read r =
+      read({{"lava.support", "9"}, {"lava.heat.convection", "-1"}, {"lava.rheology.law", "vtf"}, {"lava.vent[0].start", "-2 s"}});
+  for (const char* key : {"lava.support", "lava.heat.convection", "lava.rheology.law", "lava.vent[0].start"})
+    EXPECT_TRUE(contains(r.faults, key)) << key << "\n" << r.faults;
 }
 
 TEST(ReadLava, DocumentsEveryParameterItReads) {
@@ -168,8 +185,9 @@ TEST(ReadLava, DocumentsEveryParameterItReads) {
   read_lava(lava, 1);
   std::string documented;
   for (const ParameterDoc& doc : all.docs()) documented += doc.path + " ";
-  for (const char* path : {"lava.model", "lava.preset", "lava.spacing", "lava.heat.on", "lava.heat.latent_heat", "lava.heat.ground_conductance", "lava.rheology.law", "lava.crust_viscosity",
-                           "lava.crust_strength", "lava.slip_length", "lava.sleep_pace", "lava.sleep_delay", "lava.viscosity_tolerance", "lava.vent[].rate"})
+  for (const char* path : {"lava.model", "lava.preset", "lava.spacing", "lava.heat.on", "lava.heat.latent_heat",
+                           "lava.heat.ground_conductance", "lava.rheology.law", "lava.crust_viscosity", "lava.crust_strength",
+                           "lava.slip_length", "lava.sleep_pace", "lava.sleep_delay", "lava.viscosity_tolerance", "lava.vent[].rate"})
     EXPECT_TRUE(contains(documented, std::string(path) + " ")) << path;
 }
 

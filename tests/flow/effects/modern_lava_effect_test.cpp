@@ -28,7 +28,8 @@ geometry::Terrain slope(Real grade) {
 
 /// A vent near the upper end; what lines say goes before.
 std::unique_ptr<Effect> build(const geometry::Terrain& terrain, Lines lines) {
-  lines.insert(lines.begin(), {{"lava.spacing", "0.5 m"}, {"lava.vent[0].at", "[4, 8]"}, {"lava.vent[0].width", "2 m"}, {"lava.vent[0].rate", "5 m3/s"}});
+  lines.insert(lines.begin(),
+               {{"lava.spacing", "0.5 m"}, {"lava.vent[0].at", "[4, 8]"}, {"lava.vent[0].width", "2 m"}, {"lava.vent[0].rate", "5 m3/s"}});
   const Node root = scene_of(lines);
   Parameters all(root);
   Parameters lava = all.table("lava", "");
@@ -64,9 +65,29 @@ TEST(ModernLavaEffect, GivesTheFiguresThatTheSeriesReads) {
   const auto effect = build(terrain, {{"lava.preset", "etna"}});
   run_to(*effect, 1);
   const auto f = figures(*effect);
-  for (const char* name : {"particles", "volume_m3", "mass_emitted_kg", "mass_present_kg", "mass_left_kg", "steps", "smallest_step_s", "retries", "max_speed_m_s", "awake", "pressure_iterations",
-                           "viscosity_iterations", "density_error", "min_temperature_K", "mean_temperature_K", "max_temperature_K", "radiated_J", "convected_J", "ground_J", "vent_J", "stored_J",
-                           "viscous_J", "left_J"})
+  for (const char* name : {"particles",
+                           "volume_m3",
+                           "mass_emitted_kg",
+                           "mass_present_kg",
+                           "mass_left_kg",
+                           "steps",
+                           "smallest_step_s",
+                           "retries",
+                           "max_speed_m_s",
+                           "awake",
+                           "pressure_iterations",
+                           "viscosity_iterations",
+                           "density_error",
+                           "min_temperature_K",
+                           "mean_temperature_K",
+                           "max_temperature_K",
+                           "radiated_J",
+                           "convected_J",
+                           "ground_J",
+                           "vent_J",
+                           "stored_J",
+                           "viscous_J",
+                           "left_J"})
     ASSERT_TRUE(f.contains(name) && std::isfinite(f.at(name))) << name;
   EXPECT_NEAR(f.at("particles"), 40, 13) << "5 m3 of 0.125 m3, one each of 13 sites";
   EXPECT_EQ(f.at("volume_m3"), effect->volume());
@@ -82,8 +103,15 @@ TEST(ModernLavaEffect, GivesTheFiguresThatTheSeriesReads) {
 TEST(ModernLavaEffect, HeatBudgetClosesToRounding) {
   const geometry::Terrain terrain = slope(0.3);
   // Of two vents of different temperature; awake, and asleep after a while.
-  const auto effect = build(terrain, {{"lava.preset", "etna"}, {"lava.vent[0].stop", "2 s"}, {"lava.vent[1].at", "[4, 11]"}, {"lava.vent[1].width", "1 m"}, {"lava.vent[1].rate", "1 m3/s"}, {"lava.vent[1].stop", "3 s"},
-                                      {"lava.vent[1].temperature", "1000 degC"}, {"lava.sleep_pace", "30 s"}, {"lava.sleep_delay", "1 s"}});
+  const auto effect = build(terrain, {{"lava.preset", "etna"},
+                                      {"lava.vent[0].stop", "2 s"},
+                                      {"lava.vent[1].at", "[4, 11]"},
+                                      {"lava.vent[1].width", "1 m"},
+                                      {"lava.vent[1].rate", "1 m3/s"},
+                                      {"lava.vent[1].stop", "3 s"},
+                                      {"lava.vent[1].temperature", "1000 degC"},
+                                      {"lava.sleep_pace", "30 s"},
+                                      {"lava.sleep_delay", "1 s"}});
   for (const Real t : {1.0, 3.0, 6.0, 30.0}) {
     run_to(*effect, t);
     const auto f = figures(*effect);
