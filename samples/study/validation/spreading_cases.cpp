@@ -87,11 +87,16 @@ CaseResult bm1() {
   return result;
 }
 
+/// When the law's radius is five mean depths, looked for from a time on.
+Real first_thin(const reference::GravityCurrent& law, Real t) {
+  while (kPi * std::pow(law.front(t), 3) < 5 * law.volume(t)) t *= 1.01;
+  return t;
+}
+
 /// Radii of a run and of the law, their power laws, and the plot of both. Fitted from where the law's radius is five mean depths: the law is
 /// of thin films, the particles are not.
 void add_power_law(CaseResult& result, const std::string& file, const std::string& title, const reference::GravityCurrent& exact, const Curve& all) {
-  Real from = all.x.front();
-  while (kPi * std::pow(exact.front(from), 3) < 5 * exact.volume(from)) from *= 1.01;
+  const Real from = first_thin(exact, all.x.front());
   std::vector<Real> t, r;
   for (std::size_t i = 0; i < all.x.size(); ++i)
     if (all.x[i] >= from) {
@@ -110,27 +115,29 @@ void add_power_law(CaseResult& result, const std::string& file, const std::strin
   result.note = fmt::format("Fitted from {:.0f} s (radius five mean depths) to {:.0f} s. ", from, all.x.back());
 }
 
+// Begins as the similarity solution: a cylinder's own collapse, which is not a thin film's, takes until the film is too thin for particles.
 CaseResult huppert_release() {
-  const Real dx = 0.05, mu = 1e4;
+  const Real dx = 0.04, mu = 1e4, end = 120;
   const ModernOptions options = isothermal(dx, mu);
   ModernLava lava(options, {}, {plane(Vec3::UnitZ(), Vec3::Zero())});
-  std::vector<Vec3> x = block(Vec3(-1.2, -1.2, 0), {48, 48, 20}, dx);
-  std::erase_if(x, [](const Vec3& p) { return std::hypot(p.x(), p.y()) > 1; });
+  const reference::GravityCurrent planned(reference::Spread::kAxisymmetric, 0, kPi, mu / options.density);
+  const Real begin = first_thin(planned, 1);
+  std::vector<Vec3> x = block(Vec3(-2, -2, 0), {100, 100, 16}, dx);
+  std::erase_if(x, [&](const Vec3& p) { return p.z() > planned.depth(std::hypot(p.x(), p.y()), begin); });
   add_at_rest(lava, x);
   const reference::GravityCurrent exact(reference::Spread::kAxisymmetric, 0, lava.volume(), mu / options.density);
 
-  // A cylinder as high as its radius, 1 m.
   Curve radius{"particles", {}, {}, true, false};
   RunStatistics statistics;
-  for (Real t : spaced_log(0.5, 60, 25)) {
-    run_until(lava, t, 0.5, statistics);
+  for (Real t : spaced_log(begin, end, 30)) {
+    run_until(lava, t - begin, 1, statistics);
     radius.x.push_back(t);
     radius.y.push_back(mean_radius(lava.positions(), dx));
   }
   CaseResult result;
-  add_power_law(result, "huppert_release", "Cylinder of fluid on level ground", exact, radius);
+  add_power_law(result, "huppert_release", "Fixed volume on level ground", exact, radius);
   // The shape at the end: depth in rings.
-  const Real end = radius.x.back(), front = exact.front(end);
+  const Real front = exact.front(end);
   Curve shape{"particles", {}, {}, true, false}, line{"Huppert", spaced(0, front, 200), {}, false, true};
   const auto rings = static_cast<std::size_t>(1.1 * front / (2 * dx));
   std::vector<Real> volume(rings, 0);

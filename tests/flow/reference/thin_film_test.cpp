@@ -72,11 +72,11 @@ TEST(InclineReference, DoesNotDependOnItsGrid) {
 TEST(InclineReference, OnNearlyLevelGroundIsRoundAndHupperts) {
   const InclineSource source{.flux = 1e-6, .slope = 1e-6, .nu = 1e-3, .source_radius = 4e-3};
   const GravityCurrent round(Spread::kAxisymmetric, 1, source.flux, source.nu);
-  const Real times[] = {60};
+  const Real times[] = {25};
   const auto state = solve_incline_source(source, times, {.cell = 2.5e-3}).front();
-  EXPECT_NEAR(state.front, round.front(60), 0.02 * round.front(60));
-  EXPECT_NEAR(state.half_width, round.front(60), 0.02 * round.front(60));
-  EXPECT_NEAR(-state.back, round.front(60), 0.02 * round.front(60));
+  EXPECT_NEAR(state.front, round.front(times[0]), 0.02 * round.front(times[0]));
+  EXPECT_NEAR(state.half_width, round.front(times[0]), 0.02 * round.front(times[0]));
+  EXPECT_NEAR(-state.back, round.front(times[0]), 0.02 * round.front(times[0]));
 }
 
 TEST(ListerExperiment, HasItsFrontsAndWidths) {
