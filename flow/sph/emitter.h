@@ -45,6 +45,8 @@ class Emitter {
   /// here: the caller adds all of them to its own arrays, in this order. t0: the t1 of the call before, to the bit, lest
   /// one be let out twice or never. Valid until the next call.
   std::span<const Newborn> emit(Real t0, Real t1);
+  /// Whether any vent lets lava out between t0 and t1 [s].
+  bool emits(Real t0, Real t1) const { return volumes(t0) != volumes(t1); }
   /// Particles that no vent carries.
   void add_free(std::size_t count = 1);
   /// How far [m] the lava at a site rises from t0 to t1: what comes out at t1 was, at t0, that far down the conduit.

@@ -30,7 +30,8 @@ constexpr Real kFarthestShift = 0.1;  // spacings, a step
 constexpr Real kEnough = 0.3;        // of what is to be taken back may be left
 constexpr Real kFillUp = 0.2;        // share of a density that is too low that compression may make up in one step
 constexpr Real kWake = 2;            // times sleep_speed
-constexpr std::string_view kModel = "modern 1";  // of a checkpoint: changes with what is saved
+constexpr int kNap = 16;             // steps of max_step that sleepers' heat takes at a time while nobody is awake
+constexpr std::string_view kModel = "modern 2";  // of a checkpoint: changes with what is saved
 
 BoundaryTable make_table(KernelKind kind, Real support, Real spacing) {
   switch (kind) {
@@ -70,6 +71,7 @@ struct ModernLava::Impl {
   Emitter emitter;
   Heat heat;
   Real time = 0, acceleration = 0;      // largest, of the last step
+  Real rested = 0;                      // [s] that heat lies behind; 0 while anybody is awake
   std::uint64_t steps = 0;
 
   // Of the step: the particles it looks at, by place in `set`.
@@ -171,6 +173,7 @@ struct ModernLava::Impl {
     Census::values(self.census, io);
     io.value("time", self.time);
     io.value("acceleration", self.acceleration);
+    io.value("rested", self.rested);
     io.value("steps", self.steps);
   }
 
@@ -418,9 +421,10 @@ struct ModernLava::Impl {
     ZONE("sph.step");
     CHECK_GT(dt_max, 0.0);
     ModernReport report;
-    if (steps % kSortInterval == 0) {
+    const bool all_asleep = std::find(asleep.begin(), asleep.end(), 0) == asleep.end();
+    if (steps % kSortInterval == 0 && !all_asleep) {
       report.left = drop_what_left();
-      if (std::find(asleep.begin(), asleep.end(), 0) != asleep.end()) sort_particles();
+      sort_particles();
     }
     Real dt = std::min(dt_max, stable_step());
     if (dt_max - dt < 1e-6 * dt) dt = dt_max;  // no crumb of a step is left over
@@ -429,6 +433,10 @@ struct ModernLava::Impl {
 
     emitter.carry(time, dt, v);
     set.find(x, asleep, support);
+    if (all_asleep) {
+      rest(dt, report);
+      return report;
+    }
     const std::size_t m = set.particles.size();
     lx.resize(m);
     start.resize(m);
@@ -442,14 +450,13 @@ struct ModernLava::Impl {
       fixed[k] = k >= set.awake + set.drowsy || emitter.held(i);
     }, 2048);
     look_around();
-    if (m > 0) find_viscosities();
-    if (m == 0) neighbors = {};
+    find_viscosities();
     std::vector<Real> excess(set.awake);
     parallel_for(set.awake, [&](std::size_t k) { excess[k] = std::max(shape.density[k] - 1, 0.0); }, 4096);
     report.density_error = rms(excess);
 
     for (;; ++report.retries, dt /= 2) {
-      if (m == 0 || try_step(dt, report)) break;
+      if (try_step(dt, report)) break;
       if (report.retries == kMaxRetries)
         throw UnstableError(fmt::format("the step at t = {:.6g} s stayed unstable down to dt = {:.3g} s ({} particles)", time, dt, size()));
       emitter.carry(time, dt / 2, v);
@@ -466,13 +473,31 @@ struct ModernLava::Impl {
     }, 2048);
     // Sleepers take up the load, or they would have to yield to it anew each step.
     for (std::size_t k = set.awake; k < set.awake + set.drowsy; ++k) q[set.particles[k]] = lq[k];
-    acceleration = 0;
-    if (m > 0) acceleration = std::sqrt(parallel_max(set.awake, 0, [&](std::size_t k) { return ((lv[k] - start[k]) / dt).squaredNorm(); }));
+    acceleration = std::sqrt(parallel_max(set.awake, 0, [&](std::size_t k) { return ((lv[k] - start[k]) / dt).squaredNorm(); }));
     ground.moved(all ? lx : before_x, x);
     ground.project(x, v, [&](std::size_t i) { return !emitter.held(i) && !asleep[i]; });
     fall_asleep(dt);
     wrap();
     heat_step(dt, report);
+    report.neighbor_pairs = neighbors.pairs();
+    finish(dt, report);
+    return report;
+  }
+
+  /// A step in which nobody moves: heat, by many at a time, and vents.
+  void rest(Real dt, ModernReport& report) {
+    acceleration = 0;
+    rested += dt;
+    if (rested >= kNap * o.max_step || emitter.emits(time, time + dt)) catch_up(report);
+    finish(dt, report);
+  }
+
+  void catch_up(ModernReport& report) {
+    if (rested > 0) heat_step(rested, report);
+    rested = 0;
+  }
+
+  void finish(Real dt, ModernReport& report) {
     time += dt;
     ++steps;
     report.emitted = emit(time - dt, time);
@@ -480,14 +505,12 @@ struct ModernLava::Impl {
 
     report.dt = dt;
     report.awake = set.awake;
-    report.neighbor_pairs = neighbors.pairs();
     report.max_speed = largest_norm(v);
     const std::span<const Real> T = heat.temperature();
     report.max_temperature = parallel_max(size(), 0, [&](std::size_t i) { return T[i]; });
     report.min_temperature = -parallel_max(size(), -1e6, [&](std::size_t i) { return -T[i]; });
     COUNT("sph.steps", 1);
     COUNT("sph.awake particles", set.awake);
-    return report;
   }
 
   void load(StateReader& in) {
@@ -524,6 +547,8 @@ void ModernLava::add(std::span<const Vec3> x, std::span<const Vec3> v, std::span
   CHECK_EQ(v.size(), x.size());
   CHECK_EQ(temperature.size(), x.size());
   Impl& m = *impl_;
+  ModernReport unreported;
+  m.catch_up(unreported);
   for (std::size_t i = 0; i < x.size(); ++i) {
     CHECK(x[i].allFinite() && v[i].allFinite() && std::isfinite(temperature[i]));
     m.born(x[i], v[i], temperature[i]);

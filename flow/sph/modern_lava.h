@@ -37,7 +37,7 @@ struct ModernOptions {
   Real divergence_tolerance = 1e-4;  ///< of the pressure solve: rms change of density in a step it may leave
   Real density_tolerance = 2e-4;     ///< of taking density back that is too large, rms
   Real viscosity_tolerance = 1e-4;   ///< of the viscosity solve: residual over right-hand side
-  int density_iterations = 4;        ///< at most, of that: it goes on in the next step
+  int density_iterations = 2;        ///< at most, of that: it goes on in the next step
   int max_iterations = 1000;         ///< of the pressure and viscosity solves
   int coupling = 1;          ///< pressure and viscosity are solved this often a step
   Real sleep_speed = 0;      ///< [m/s]: particles that are slower for sleep_delay fall asleep; 0: never
@@ -80,7 +80,8 @@ struct ModernReport {
 ///
 /// Sleep: a particle slower than sleep_speed for sleep_delay is left where it is: no neighbours, no pressure, no viscosity.
 /// The sleepers within reach of those awake are moved along in the solves; one that would go faster than twice
-/// sleep_speed wakes. Heat goes on (see Heat), in all.
+/// sleep_speed wakes. Heat goes on (see Heat), in all; while everything sleeps and no vent is open it takes 16 max_step at
+/// a time, and temperatures lie behind by up to that.
 ///
 /// Deterministic: the same bits on any number of threads. Not thread-safe itself.
 class ModernLava {

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <map>
@@ -152,11 +153,64 @@ CaseResult maunga_whau() {
   return result;
 }
 
+// The sample scene, whole: a flow that comes to rest and sleeps, cools for eleven hours, and is woken by a second vent.
+CaseResult cold_night() {
+  const auto loaded = load(scenes() / "maunga-whau-night.toml", {});
+  flow::Simulation& simulation = *loaded->simulation;
+  const flow::Effect& lava = *simulation.effects().front();
+  constexpr double kSecondVent = 41000;
+  constexpr int kLastFrames = 10;  // before the second vent: the night's end
+
+  Curve awake{"awake", {}, {}, false, false}, all{"all", {}, {}, false, true};
+  Curve cost{"a step", {}, {}, false, false};
+  std::map<std::string, double> f;
+  double steps = 0, peak = 0, old = 0, asleep_from = -1, woken = 0;
+  std::vector<double> costs;  // of a step, by frame, until the second vent
+  double awake_before = 0;
+  while (simulation.frame() < loaded->scene.frames) {
+    const auto start = std::chrono::steady_clock::now();
+    simulation.advance([] { return true; });
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    for (const auto& [name, value] : lava.figures()) f[name] = value;
+    const double a_step = seconds / (f["steps"] - steps), t = simulation.time();
+    steps = f["steps"];
+    for (Curve* c : {&awake, &all, &cost}) c->x.push_back(t / 3600);
+    awake.y.push_back(f["awake"]), all.y.push_back(f["particles"]), cost.y.push_back(1e3 * a_step);
+    if (t < kSecondVent) {
+      costs.push_back(a_step);
+      peak = std::max(peak, a_step);
+      old = f["particles"];
+      awake_before = f["awake"];
+      if (f["awake"] > 0) asleep_from = -1;
+      else if (asleep_from < 0) asleep_from = t;
+    } else {
+      woken = std::max(woken, f["awake"] - (f["particles"] - old));
+    }
+  }
+  double end = 0;
+  for (int k = 0; k < kLastFrames; ++k) end += costs[costs.size() - 1 - static_cast<std::size_t>(k)] / kLastFrames;
+
+  CaseResult result;
+  result.measures = {compared("a step at the night's end, peak for reference", "ms", 1e3 * end, 1e3 * peak, 0.02),
+                     bounded("particles awake when the second vent opens", awake_before, 0, "particles"),
+                     bounded("particles awake at the end", f["awake"], 0, "particles"),
+                     compared("sleepers awake at once by the second vent, all there are for reference", "particles", woken, old, 1)};
+  result.measures[0].error = end / peak;
+  result.measures[3].error = woken > 0 ? 0 : 1;
+  result.measures[3].hold = 0;
+  result.plots = {{"cold_night_awake", "A night on Maunga Whau: particles", "time [h]", "particles", false, false, {all, awake}},
+                  {"cold_night_cost", "A night on Maunga Whau: cost", "time [h]", "a step [ms]", false, true, {cost}}};
+  result.note = fmt::format("{:.0f} particles, {:.0f} of them before the second vent; all asleep from {:.2g} h on; {:.0f} steps, {:.0f} tried again.",
+                            f["particles"], old, asleep_from / 3600, f["steps"], f["retries"]);
+  return result;
+}
+
 }  // namespace
 
 void add_terrain_cases(std::vector<Case>& cases) {
   cases.push_back({"maunga_whau", "Volume and heat on Maunga Whau",
                    "conservation; heights of R's volcano data set, samples/scenes/maunga-whau.asc", false, maunga_whau});
+  cases.push_back({"cold-night", "A night on Maunga Whau: sleep and waking", "what sleeping lava may cost; samples/scenes/maunga-whau-night.toml", false, cold_night});
 }
 
 }  // namespace effuse::study

@@ -552,6 +552,36 @@ TEST(ModernLava, AFlowThatHasStoppedFallsAsleepAndCostsNothing) {
   EXPECT_EQ(sleepers(lava), lava.size());
 }
 
+TEST(ModernLava, SleepersCoolInLongStepsAsTheyWouldInShortOnesAndTheBudgetCloses) {
+  // The same cake, asleep for ten minutes, its heat 80 s at a time and 5 s at a time.
+  Real cooled[2];
+  for (const bool fine : {false, true}) {
+    ModernOptions o = sleepy();
+    o.heat.on = true;
+    o.max_step = fine ? 0.3125 : 5;
+    ModernLava lava(o, {}, {floor_at()});
+    fill(lava, lattice_block(8, 6, 3, 0.2), Vec3::Zero(), Vec3::Zero(), 1300);
+    let_sleep(lava);
+    const auto mean = [&] {
+      Real sum = 0;
+      for (const Real T : lava.temperatures()) sum += T / static_cast<Real>(lava.size());
+      return sum;
+    };
+    const Real before = mean(), enthalpy = lava.heat().total_enthalpy();
+    Real lost = 0;
+    const int steps = 7 * 16 * (fine ? 16 : 1);
+    for (int step = 0; step < steps; ++step) {
+      const ModernReport report = lava.step(5);
+      EXPECT_EQ(report.awake, 0u);
+      lost += report.heat.radiated + report.heat.convected + report.heat.ground - report.heat.dissipated;
+    }
+    cooled[fine] = before - mean();
+    EXPECT_NEAR(enthalpy - lava.heat().total_enthalpy(), lost, 1e-6 * std::abs(lost));
+  }
+  EXPECT_GT(cooled[0], 5);
+  EXPECT_NEAR(cooled[0], cooled[1], 0.02 * cooled[1]);
+}
+
 TEST(ModernLava, ANewVentWakesWhatItTouches) {
   Vent vent = crater(0.05, 0.4, Vec3(0.6, 0.6, 0));
   vent.start = 100;
