@@ -76,7 +76,7 @@ void read_melt(Parameters& p, const LavaPreset* preset, MeltLaw& melt) {
   // What is missing or out of range reads as 0 or the default; then the law stays what it was.
   switch (kind) {
     case MeltKind::kConstant: {
-      const Real mu = p.number("viscosity", "Pa s", std::exp(sph::MeltLaw{}.p), kViscosity, "at any temperature");
+      const Real mu = p.number("viscosity", "Pa s", 1000, kViscosity, "at any temperature");
       melt = sph::constant_melt(mu);
       break;
     }

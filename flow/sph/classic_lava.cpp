@@ -334,11 +334,12 @@ StepReport ClassicLava::step(Real dt_max) {
                                       options_.stiffness));
   }
   max_acceleration_ = std::sqrt(parallel_max(size(), 0, [&](std::size_t i) { return ((y_.v[i] - before_.v[i]) / dt).squaredNorm(); }));
+  const Real from = time_;
   time_ += dt;
   ++steps_;
   ground_.moved(before_.x, y_.x);
   ground_.project(y_.x, y_.v, [&](std::size_t i) { return !emitter_.held(i); });
-  report.emitted = emit(time_ - dt, time_);
+  report.emitted = emit(from, time_);
   frames_.renew(time_, y_.x);
 
   report.dt = dt;
@@ -414,6 +415,18 @@ void ClassicLava::save(StateWriter& out) const {
 }
 
 void ClassicLava::load(StateReader& in) {
+  StateWriter before;
+  save(before);
+  try {
+    load_unsafely(in);
+  } catch (...) {
+    StateReader back(before.bytes(), "");
+    load_unsafely(back);
+    throw;
+  }
+}
+
+void ClassicLava::load_unsafely(StateReader& in) {
   std::string model;
   in.text("model", model);
   if (model != kModel) throw InputError(Place{}, fmt::format("the checkpoint holds a '{:.40}' lava, wanted '{}'", model, kModel));

@@ -160,10 +160,11 @@ class ClassicLava {
 
   void add_to(StateHash& hash) const;
   void save(StateWriter& out) const;
-  /// Throws InputError when the bytes are of another version or cut short.
+  /// Throws InputError when the bytes are of another version or cut short, and leaves everything as it was.
   void load(StateReader& in);
 
  private:
+  void load_unsafely(StateReader& in);
   std::size_t emit(Real t0, Real t1);
   void born(const Vec3& x, const Vec3& v, Real temperature);  // without its part in emitter_ and frames_
   void keep(std::span<const Index> which);  // drops all other particles, in this order

@@ -498,9 +498,10 @@ struct ModernLava::Impl {
   }
 
   void finish(Real dt, ModernReport& report) {
+    const Real from = time;
     time += dt;
     ++steps;
-    report.emitted = emit(time - dt, time);
+    report.emitted = emit(from, time);
     frames.renew(time, x);
 
     report.dt = dt;

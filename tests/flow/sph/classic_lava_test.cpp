@@ -326,7 +326,12 @@ TEST(ClassicLava, GoesOnFromACheckpointBitForBit) {
 
   StateReader cut(std::string_view(out.bytes()).substr(0, out.bytes().size() / 2), "memory");
   ClassicLava other = fresh();
+  other.step(1);
+  StateHash before, after;
+  other.add_to(before);
   EXPECT_THROW(other.load(cut), InputError);
+  other.add_to(after);
+  EXPECT_EQ(before.hex(), after.hex()) << "untouched";
 }
 
 TEST(ClassicLava, RetriesASmallerStepAndGivesUpWithTheStateAsItWas) {
