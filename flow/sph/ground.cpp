@@ -33,6 +33,11 @@ void Ground::keep(std::span<const Index> which) {
 void Ground::find_asked(std::span<const Vec3> x) {
   const std::size_t n = asked_.size();
   place_.assign(x.size(), kNone);
+  if (query_.capacity() > 4 * n + 4096) {  // the first question is about all, later ones are not
+    std::vector<Vec3>().swap(query_);
+    std::vector<Contact>().swap(contacts_);
+    asked_.shrink_to_fit();
+  }
   query_.resize(n);
   contacts_.resize(n * sources_.size());
   parallel_for(n, [&](std::size_t q) {

@@ -25,6 +25,7 @@ namespace {
 constexpr int kSortInterval = 16;    // steps between two orderings of the particles in memory, and looks for what left
 constexpr int kMaxRetries = 8;
 constexpr Real kClearance = 0.25;    // a particle stays this many spacings off the ground
+constexpr Real kLook = 1.5;          // supports: ground this far off is not looked for again until a particle may be near it
 constexpr Real kTakeBack = 0.2;      // share of a density that is too large that one step takes back
 constexpr Real kFarthestShift = 0.1;  // spacings, a step
 constexpr Real kEnough = 0.3;        // of what is to be taken back may be left
@@ -99,7 +100,7 @@ struct ModernLava::Impl {
         table(make_table(o.kernel, support, o.spacing)),
         film(table, o.spacing),
         frames(o.rest_period),
-        ground({support, support, kClearance * o.spacing, 8}, std::move(sources), std::move(inside)),
+        ground({support, kLook * support, kClearance * o.spacing, 8}, std::move(sources), std::move(inside)),
         emitter(std::move(vents), o.spacing, o.seed, ground.sources()),
         heat(o.heat, o.spacing, o.density) {
     CHECK_GT(o.spacing, 0.0);
