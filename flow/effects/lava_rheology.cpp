@@ -27,7 +27,7 @@ std::vector<std::string> names(const std::string_view (&list)[N]) {
 constexpr Parameters::Range kTemperature = {0, 5000, true};
 constexpr Parameters::Range kFraction = {0, 1};
 // Further apart than any melt is from any other; beyond them exp() leaves the numbers.
-constexpr Parameters::Range kViscosity = {1e-30, 1e30};
+constexpr Parameters::Range kViscosity = {1e-6, 1e20};
 
 void read_oxides(Parameters& p, const LavaPreset* preset, MeltLaw& melt) {
   Parameters table = p.table("oxides", "of law = \"grd08\": what the melt is made of, plain numbers in wt %");

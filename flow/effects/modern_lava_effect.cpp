@@ -47,14 +47,19 @@ class ModernLavaEffect final : public Effect {
   Real time() const override { return lava_.time(); }
 
   void step(Real t_end) override {
-    last_ = lava_.step(longest_step(t_end - lava_.time()));
+    const Real wanted = longest_step(t_end - lava_.time());
+    last_ = lava_.step(wanted);
     Totals& t = totals_;
     t.steps += 1;
     t.retries += last_.retries;
     t.pressure_iterations += last_.pressure_iterations;
     t.viscosity_iterations += last_.viscosity_iterations;
     t.density_iterations += last_.density_iterations;
-    t.smallest_step = std::min(t.smallest_step, last_.dt);
+    // A step that ends a frame is as short as what was left of it.
+    if (last_.dt < wanted || t.smallest_step > wanted) t.smallest_step = std::min(t.smallest_step, last_.dt);
+    t.unsolved += last_.solved ? 0 : 1;
+    t.divergence_error = std::max(t.divergence_error, last_.divergence_error);
+    t.viscosity_residual = std::max(t.viscosity_residual, last_.viscosity_residual);
     t.largest_density_error = std::max(t.largest_density_error, last_.density_error);
     if (heat_) book_heat();
   }
@@ -91,6 +96,9 @@ class ModernLavaEffect final : public Effect {
         {"pressure_iterations", mean(t.pressure_iterations)},
         {"viscosity_iterations", mean(t.viscosity_iterations)},
         {"density_iterations", mean(t.density_iterations)},
+        {"largest_divergence_error", t.divergence_error},
+        {"largest_viscosity_residual", t.viscosity_residual},
+        {"unsolved_steps", t.unsolved},
         {"density_error", last_.density_error},
         {"largest_density_error", t.largest_density_error},
         {"max_speed_m_s", last_.max_speed},
@@ -139,6 +147,7 @@ class ModernLavaEffect final : public Effect {
     Real steps = 0, retries = 0;
     Real pressure_iterations = 0, viscosity_iterations = 0, density_iterations = 0;
     Real smallest_step = 1e9, largest_density_error = 0;
+    Real unsolved = 0, divergence_error = 0, viscosity_residual = 0;  // steps; worst of all
     Real radiated = 0, convected = 0, ground = 0, viscous = 0, vent = 0, left = 0;
     Real stored = 0;  // now
   };
@@ -154,9 +163,8 @@ class ModernLavaEffect final : public Effect {
     Real born = 0;
     for (const Real enthalpy : lava_.heat().enthalpy().last(last_.emitted)) born += lava_.heat().particle_mass() * enthalpy;
     t.vent += born;
-    const Real before = t.stored;
+    t.left += last_.left_enthalpy;
     t.stored = lava_.heat().total_enthalpy();
-    if (last_.left > 0) t.left += before + born + booked.dissipated - booked.radiated - booked.convected - booked.ground - t.stored;
   }
 
   /// A run resumed reports the whole.
@@ -170,6 +178,9 @@ class ModernLavaEffect final : public Effect {
     io.value("density_iterations", t.density_iterations);
     io.value("smallest_step", t.smallest_step);
     io.value("largest_density_error", t.largest_density_error);
+    io.value("unsolved", t.unsolved);
+    io.value("divergence_error", t.divergence_error);
+    io.value("viscosity_residual", t.viscosity_residual);
     io.value("radiated", t.radiated);
     io.value("convected", t.convected);
     io.value("ground", t.ground);
@@ -306,6 +317,8 @@ LavaModel read_modern_lava(Parameters& p) {
       p.number("courant", "", o.courant, {0, 2, true}, "of the step: share of the time in which the fastest particle moves one spacing");
   o.max_step = p.number("max_step", "s", o.max_step, positive, "no step is longer");
   o.min_step = p.number("min_step", "s", o.min_step, positive, "a run that would need a shorter one ends");
+  if (o.min_step > o.max_step) p.fault("min_step", fmt::format("min_step, {:g} s, is above max_step, {:g} s", o.min_step, o.max_step));
+  o.ground_speed = 0;  // terrain stands
   o.divergence_tolerance = p.number("divergence_tolerance", "", o.divergence_tolerance, kTolerance,
                                     "of the pressure solve: change of density a step may leave, rms");
   o.density_tolerance = p.number("density_tolerance", "", o.density_tolerance, kTolerance, "of taking compression back, rms");

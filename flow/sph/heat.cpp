@@ -14,7 +14,7 @@
 namespace effuse::flow::sph {
 
 namespace {
-constexpr std::string_view kModel = "heat 1";  // of a checkpoint: changes with what is saved
+constexpr std::string_view kModel = "heat 2";  // of a checkpoint: changes with what is saved
 constexpr int kLast = kColumnCells - 1;
 constexpr Real kFinestShare = 1.0 / 200;       // of a column's depth: its first cell
 constexpr Real kFinestCell = 2e-3;             // [m], at most
@@ -122,11 +122,12 @@ void Heat::born(Real temperature) {
   temperature_.push_back(temperature);
   surface_temperature_.push_back(temperature);
   crust_thickness_.push_back(0);
+  crust_share_.push_back(0);
   solid_fraction_.push_back(options_.curve.solid_fraction(enthalpy_.back()));
 }
 
 void Heat::keep(std::span<const Index> which) {
-  for (auto* values : {&enthalpy_, &contact_time_, &temperature_, &surface_temperature_, &crust_thickness_, &solid_fraction_}) gather(*values, which);
+  for (auto* values : {&enthalpy_, &contact_time_, &temperature_, &surface_temperature_, &crust_thickness_, &crust_share_, &solid_fraction_}) gather(*values, which);
   gather(column_of_, which);
   std::vector<CrustColumn> columns;
   columns.reserve(columns_.size());
@@ -442,7 +443,7 @@ HeatBudget Heat::lose_lump(std::size_t i, Real dt, const Surroundings& s) {
     }
     const Real T = curve.temperature(H);
     const Real radiated = sky * air.radiated(T), convected = sky * air.convected(T), ground = G * (T - ground_T);
-    // What Newton's method left goes to the largest of the three: the budget closes.
+    // What Newton's method left goes to the sky, or where there is none to the ground: the budget closes.
     const Real rest = mass_ * (start - H) - h * (radiated + convected + ground);
     budget.radiated += h * radiated + (sky > 0 ? rest : 0);
     budget.convected += h * convected;
@@ -463,7 +464,7 @@ void Heat::refresh_particle(std::size_t i) {
   const Index c = column_of_[i];
   if (c == kNone) {
     surface_temperature_[i] = temperature_[i];
-    crust_thickness_[i] = 0;
+    crust_thickness_[i] = crust_share_[i] = 0;
     solid_fraction_[i] = curve.solid_fraction(enthalpy_[i]);
     return;
   }
@@ -472,7 +473,9 @@ void Heat::refresh_particle(std::size_t i) {
   for (int j = 0; j < kColumnCells; ++j) solid += shape_.share[j] * curve.solid_fraction(column.H[j]);
   solid_fraction_[i] = solid;
   surface_temperature_[i] = column.buried > 0 ? temperature_[i] : column.surface_temperature;
-  crust_thickness_[i] = column.buried > 0 ? 0 : crust_depth(column, shape_, curve, options_.crust_temperature);
+  const Real depth = crust_depth(column, shape_, curve, options_.crust_temperature);
+  crust_thickness_[i] = column.buried > 0 ? 0 : depth;
+  crust_share_[i] = std::clamp(depth / column.depth, 0.0, 1.0);
 }
 
 Real Heat::total_enthalpy() const {
@@ -491,7 +494,7 @@ std::vector<Heat::Level> Heat::profile(std::size_t i) const {
 
 std::size_t Heat::memory() const {
   std::size_t bytes = columns_.capacity() * sizeof(CrustColumn) + packed_.capacity() * sizeof(Packed);
-  for (const auto* values : {&enthalpy_, &contact_time_, &temperature_, &surface_temperature_, &crust_thickness_, &solid_fraction_, &node_, &node_before_, &gain_, &rate_})
+  for (const auto* values : {&enthalpy_, &contact_time_, &temperature_, &surface_temperature_, &crust_thickness_, &crust_share_, &solid_fraction_, &node_, &node_before_, &gain_, &rate_})
     bytes += values->capacity() * sizeof(Real);
   for (const auto* values : {&column_of_, &owner_}) bytes += values->capacity() * sizeof(Index);
   return bytes;
@@ -508,6 +511,7 @@ void Heat::archive(Self& self, Archive& io) {
   io.array("temperature", self.temperature_);
   io.array("surface_temperature", self.surface_temperature_);
   io.array("crust_thickness", self.crust_thickness_);
+  io.array("crust_share", self.crust_share_);
   io.array("solid_fraction", self.solid_fraction_);
 }
 
@@ -529,7 +533,7 @@ void Heat::load(StateReader& in) {
   archive(loaded, in);
   const std::size_t n = loaded.enthalpy_.size();
   check_loaded_sizes(n, {loaded.contact_time_.size(), loaded.column_of_.size(), loaded.temperature_.size(), loaded.surface_temperature_.size(),
-                         loaded.crust_thickness_.size(), loaded.solid_fraction_.size()});
+                         loaded.crust_thickness_.size(), loaded.crust_share_.size(), loaded.solid_fraction_.size()});
   std::size_t owned = 0;
   for (std::size_t i = 0; i < n; ++i) {
     const Index c = loaded.column_of_[i];

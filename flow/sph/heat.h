@@ -109,6 +109,8 @@ class Heat {
   /// where more than dx^2 is exposed). A crust that is thicker goes on in the solid fraction of the particles below.
   /// 0 for particles that are not exposed.
   std::span<const Real> crust_thickness() const { return crust_thickness_; }
+  /// Of the particle's volume, 0 to 1: that depth over its column's. Kept while the column is, lava over it or not.
+  std::span<const Real> crust_share() const { return crust_share_; }
   std::span<const Real> solid_fraction() const { return solid_fraction_; }            ///< by mass, 0 to 1
   std::span<const Real> enthalpy() const { return enthalpy_; }                        ///< mean of the particle [J/kg]
   Real total_enthalpy() const;                                                        ///< [J]
@@ -160,7 +162,7 @@ class Heat {
   std::vector<Index> owner_;        // of each column
   Real pair_time_ = 0;              // since pairs last exchanged [s]
 
-  std::vector<Real> temperature_, surface_temperature_, crust_thickness_, solid_fraction_;
+  std::vector<Real> temperature_, surface_temperature_, crust_thickness_, crust_share_, solid_fraction_;
 
   struct Packed {
     Real x, y, z, T, k, column;

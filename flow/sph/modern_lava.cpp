@@ -30,9 +30,12 @@ constexpr Real kTakeBack = 0.2;      // share of a density that is too large tha
 constexpr Real kFarthestShift = 0.1;  // spacings, a step
 constexpr Real kEnough = 0.3;        // of what is to be taken back may be left
 constexpr Real kFillUp = 0.2;        // share of a density that is too low that compression may make up in one step
+constexpr Real kFailed = 10;          // times its tolerance: a solve that stays above has failed
+constexpr Real kSteep = 0.5;          // how far the shear rate at a wall lies from the mean over the support to the wall's own; 0.35: thin films hold on too hard, 1: too little
+constexpr Real kTight = 0.25;          // times dt sqrt(g / dx): share of the divergence tolerance that some iterations are spent on
 constexpr Real kWake = 2;            // times sleep_speed
 constexpr int kNap = 16;             // steps of max_step that sleepers' heat takes at a time while nobody is awake
-constexpr std::string_view kModel = "modern 2";  // of a checkpoint: changes with what is saved
+constexpr std::string_view kModel = "modern 3";  // of a checkpoint: changes with what is saved
 
 BoundaryTable make_table(KernelKind kind, Real support, Real spacing) {
   switch (kind) {
@@ -73,6 +76,11 @@ struct ModernLava::Impl {
   Heat heat;
   Real time = 0, acceleration = 0;      // largest, of the last step
   Real rested = 0;                      // [s] that heat lies behind; 0 while anybody is awake
+  Real left_enthalpy = 0;               // [J] of all that left
+  // Not in a report yet: what add() had heat catch up on, and those that left before a step that failed.
+  HeatBudget owed;
+  Real reported_enthalpy = 0;
+  std::uint64_t reported_left = 0;
   std::uint64_t steps = 0;
 
   // Of the step: the particles it looks at, by place in `set`.
@@ -100,7 +108,7 @@ struct ModernLava::Impl {
         table(make_table(o.kernel, support, o.spacing)),
         film(table, o.spacing),
         frames(o.rest_period),
-        ground({support, kLook * support, kClearance * o.spacing, 8}, std::move(sources), std::move(inside)),
+        ground({support, std::isfinite(o.ground_speed) ? kLook * support : support, kClearance * o.spacing, 8}, std::move(sources), std::move(inside)),
         emitter(std::move(vents), o.spacing, o.seed, ground.sources()),
         heat(o.heat, o.spacing, o.density) {
     CHECK_GT(o.spacing, 0.0);
@@ -108,6 +116,8 @@ struct ModernLava::Impl {
     CHECK_GT(o.density, 0.0);
     CHECK_GT(o.courant, 0.0);
     CHECK_GT(o.max_step, 0.0);
+    CHECK_LE(o.min_step, o.max_step);
+    CHECK_GE(o.ground_speed, 0.0);
     CHECK_GE(o.coupling, 1);
     CHECK(o.slip_length >= 0);
     for (const int axis : {0, 1}) CHECK(o.period[axis] == 0 || o.period[axis] >= 2 * support);
@@ -175,6 +185,13 @@ struct ModernLava::Impl {
     io.value("time", self.time);
     io.value("acceleration", self.acceleration);
     io.value("rested", self.rested);
+    io.value("left_enthalpy", self.left_enthalpy);
+    io.value("owed_radiated", self.owed.radiated);
+    io.value("owed_convected", self.owed.convected);
+    io.value("owed_ground", self.owed.ground);
+    io.value("owed_dissipated", self.owed.dissipated);
+    io.value("reported_enthalpy", self.reported_enthalpy);
+    io.value("reported_left", self.reported_left);
     io.value("steps", self.steps);
   }
 
@@ -193,13 +210,19 @@ struct ModernLava::Impl {
     return s;
   }
 
-  std::size_t drop_what_left() {
-    if (!ground.has_edge()) return 0;
+  void drop_what_left() {
+    if (!ground.has_edge()) return;
     const std::vector<Index> stay = ground.who_stays(x, surface, o.spacing);
     const std::size_t gone = size() - stay.size();
-    if (gone > 0) keep(stay);
+    if (gone == 0) return;
+    // Their own enthalpies, not a difference of totals: it is compared with one.
+    std::size_t next = 0;
+    for (std::size_t i = 0; i < size(); ++i) {
+      if (next < stay.size() && stay[next] == i) ++next;
+      else left_enthalpy += mass * heat.enthalpy()[i];
+    }
+    keep(stay);
     census.count_left(gone);
-    return gone;
   }
 
   void sort_particles() {
@@ -209,10 +232,10 @@ struct ModernLava::Impl {
   }
 
   /// Lists of all particles at `at`, of the nearest images where the flow is periodic.
-  void find_neighbors(std::span<const Vec3> at) {
+  void find_neighbors(std::span<const Vec3> at, Neighbors& found) {
     if (o.period.isZero()) {
       grid.build(at, support);
-      neighbors.find(grid, support);
+      found.find(grid, support);
       return;
     }
     std::vector<Vec3> extended(at.begin(), at.end());
@@ -232,8 +255,8 @@ struct ModernLava::Impl {
       }
     }
     grid.build(extended, support);
-    neighbors.find(grid, support);
-    neighbors.fold(at.size(), image);
+    found.find(grid, support);
+    found.fold(at.size(), image);
   }
 
   /// The walls of the set's particles.
@@ -259,7 +282,7 @@ struct ModernLava::Impl {
   /// Everything that depends on positions alone.
   void look_around() {
     if (set.particles.empty()) return;
-    find_neighbors(lx);
+    find_neighbors(lx, neighbors);
     find_walls();
     const ParticleSystem s = system();
     pairs.build(s);
@@ -289,18 +312,28 @@ struct ModernLava::Impl {
     scratch.assign(m, 0.0);
     const bool crusted = o.heat.on && o.crust_viscosity > 0;
     if (o.rheology.needs_strain_rate() || crusted) shear_rate_squared(system(), o.slip_length, lv, scratch);
-    const std::span<const Real> T = heat.temperature(), crust_thickness = heat.crust_thickness();
+    const std::span<const Real> T = heat.temperature(), crust_share = heat.crust_share();
     parallel_for(m, [&](std::size_t k) {
       const Index i = set.particles[k];
       const Real shear = std::sqrt(scratch[k]);
       Real mu_k = o.rheology.viscosity(T[i], shear);
-      if (crusted && crust_thickness[i] > 0) {
-        // The crust's share of the thickness: viscous up to its strength.
+      if (crusted && crust_share[i] > 0) {
+        // The crust's share of the particle: viscous up to its strength.
         const Real stiff = o.crust_strength > 0 && shear * o.crust_viscosity > o.crust_strength ? o.crust_strength / shear : o.crust_viscosity;
-        mu_k += std::min(crust_thickness[i] / o.spacing, 1.0) * stiff;
+        mu_k += crust_share[i] * stiff;
       }
       lmu[k] = mu_k;
       mu[i] = mu_k;
+      // On a wall shear is what the particle's own speed makes of its distance: a mean over the support says too little of it,
+      // and lava would hold on to the ground by more than its strength.
+      if (!o.rheology.needs_strain_rate()) return;
+      for (Index w = walls.first[k]; w < walls.first[k + 1]; ++w) {
+        Wall& wall = walls.walls[w];
+        const Vec3 slip = lv[k] - wall.velocity;
+        const Real along = (slip - slip.dot(wall.normal) * wall.normal).norm();
+        const Real steep = along / (std::max(wall.distance, kClearance * o.spacing) + o.slip_length);
+        if (steep > shear) wall.friction *= (mu_k - o.rheology.viscosity(T[i], shear) + o.rheology.viscosity(T[i], (1 - kSteep) * shear + kSteep * steep)) / mu_k;
+      }
     }, 1024);
   }
 
@@ -317,14 +350,18 @@ struct ModernLava::Impl {
       rate[k] = std::max(1 - shape.density[k], 0.0) * kFillUp / dt;
     }, 2048);
     report.pressure_iterations = report.viscosity_iterations = report.density_iterations = 0;
+    const Real g = o.gravity.norm(), scale = g > 0 ? dt * g : std::numeric_limits<Real>::infinity();
+    const Real tight = std::min(1.0, kTight * dt * std::sqrt(g / o.spacing)) * o.divergence_tolerance;
     for (int round = 0; round < o.coupling; ++round) {
       pressure_acceleration(s, lq, predicted);
       parallel_for(m, [&](std::size_t k) { predicted[k] = s.is_fixed(k) ? start[k] : Vec3(start[k] + dt * (predicted[k] + o.gravity)); }, 2048);
-      const ViscosityResult viscous = viscosity.solve(s, o.density, lmu, o.slip_length, dt, predicted, o.viscosity_tolerance, o.max_iterations, lv);
+      const ViscosityResult viscous = viscosity.solve(s, o.density, lmu, o.slip_length, dt, predicted, o.viscosity_tolerance, o.max_iterations, lv, scale);
       report.viscosity_iterations += viscous.iterations;
       report.viscosity_residual = viscous.residual;
-      if (!(viscous.residual < 100 * o.viscosity_tolerance)) return false;
-      const PressureResult pressed = pressure.solve_prepared(s, rate, least, dt, o.divergence_tolerance, o.max_iterations, lv, lq);
+      if (!(viscous.residual < kFailed * o.viscosity_tolerance)) return false;
+      const PressureResult pressed = pressure.solve_prepared(s, rate, least, dt, o.divergence_tolerance, o.max_iterations, lv, lq, g > 0 ? tight : o.divergence_tolerance);
+      // Lava pressed between what is fixed (a vent's, sleepers) cannot give way in any step: told, not tried again.
+      report.solved = viscous.converged && pressed.converged;
       report.pressure_iterations += pressed.iterations;
       report.divergence_error = pressed.error;
     }
@@ -360,6 +397,13 @@ struct ModernLava::Impl {
     const Real speed = largest_norm(v);
     if (speed > 0) dt = std::min(dt, o.courant * o.spacing / speed);
     if (acceleration > 0) dt = std::min(dt, o.courant * std::sqrt(o.spacing / acceleration));
+    // Waves that viscosity does not swallow within such a step: lava that seems to stand has them, too.
+    const Real g = o.gravity.norm();
+    if (g > 0 && dt > o.courant * std::sqrt(o.spacing / g)) {
+      const Real falling = o.courant * std::sqrt(o.spacing / g);
+      const Real thinnest = -parallel_max(size(), -std::numeric_limits<Real>::infinity(), [&](std::size_t i) { return asleep[i] ? -std::numeric_limits<Real>::infinity() : -mu[i]; });
+      if (thinnest / o.density * falling < o.spacing * o.spacing) dt = falling;
+    }
     return dt;
   }
 
@@ -395,10 +439,11 @@ struct ModernLava::Impl {
         for (std::size_t k = 0; k < set.awake; ++k) power[set.particles[k]] = scratch[k];
       }
     }
-    // Lists of the step's beginning are good enough for conduction; sleepers have none.
-    if (heat.conducts(dt) && !all) find_neighbors(x);
+    // Lists of the step's beginning are good enough for conduction; sleepers have none, and others of their own.
+    Neighbors everyone;
+    if (heat.conducts(dt) && !all) find_neighbors(x, everyone);
     report.heat = heat.step(dt, {.x = x,
-                                 .neighbors = neighbors,
+                                 .neighbors = all ? neighbors : everyone,
                                  .kernel = o.kernel,
                                  .support = support,
                                  .period = o.period,
@@ -422,15 +467,15 @@ struct ModernLava::Impl {
     ZONE("sph.step");
     CHECK_GT(dt_max, 0.0);
     ModernReport report;
-    const bool all_asleep = std::find(asleep.begin(), asleep.end(), 0) == asleep.end();
-    if (steps % kSortInterval == 0 && !all_asleep) {
-      report.left = drop_what_left();
-      sort_particles();
-    }
     Real dt = std::min(dt_max, stable_step());
     if (dt_max - dt < 1e-6 * dt) dt = dt_max;  // no crumb of a step is left over
     if (dt < dt_max && dt < o.min_step)
       throw UnstableError(fmt::format("at t = {:.6g} s speed or acceleration leave a step of {:.3g} s, less than min_step {:.3g} s ({} particles)", time, dt, o.min_step, size()));
+    const bool all_asleep = std::find(asleep.begin(), asleep.end(), 0) == asleep.end();
+    if (steps % kSortInterval == 0 && !all_asleep) {
+      drop_what_left();
+      sort_particles();
+    }
 
     emitter.carry(time, dt, v);
     set.find(x, asleep, support);
@@ -458,7 +503,7 @@ struct ModernLava::Impl {
 
     for (;; ++report.retries, dt /= 2) {
       if (try_step(dt, report)) break;
-      if (report.retries == kMaxRetries)
+      if (report.retries == kMaxRetries || dt / 2 < o.min_step)
         throw UnstableError(fmt::format("the step at t = {:.6g} s stayed unstable down to dt = {:.3g} s ({} particles)", time, dt, size()));
       emitter.carry(time, dt / 2, v);
       parallel_for(m, [&](std::size_t k) { start[k] = v[set.particles[k]]; }, 2048);
@@ -475,7 +520,7 @@ struct ModernLava::Impl {
     // Sleepers take up the load, or they would have to yield to it anew each step.
     for (std::size_t k = set.awake; k < set.awake + set.drowsy; ++k) q[set.particles[k]] = lq[k];
     acceleration = std::sqrt(parallel_max(set.awake, 0, [&](std::size_t k) { return ((lv[k] - start[k]) / dt).squaredNorm(); }));
-    ground.moved(all ? lx : before_x, x);
+    ground.moved(all ? lx : before_x, x, dt * o.ground_speed);
     ground.project(x, v, [&](std::size_t i) { return !emitter.held(i) && !asleep[i]; });
     fall_asleep(dt);
     wrap();
@@ -488,6 +533,7 @@ struct ModernLava::Impl {
   /// A step in which nobody moves: heat, by many at a time, and vents.
   void rest(Real dt, ModernReport& report) {
     acceleration = 0;
+    if (o.ground_speed > 0) ground.moved(x, x, dt * o.ground_speed);
     rested += dt;
     if (rested >= kNap * o.max_step || emitter.emits(time, time + dt)) catch_up(report);
     finish(dt, report);
@@ -498,12 +544,26 @@ struct ModernLava::Impl {
     rested = 0;
   }
 
+  /// Into the report: what no report has had.
+  void settle(ModernReport& report) {
+    report.heat.radiated += owed.radiated;
+    report.heat.convected += owed.convected;
+    report.heat.ground += owed.ground;
+    report.heat.dissipated += owed.dissipated;
+    owed = {};
+    report.left = census.left() - reported_left;
+    report.left_enthalpy = left_enthalpy - reported_enthalpy;
+    reported_left = census.left();
+    reported_enthalpy = left_enthalpy;
+  }
+
   void finish(Real dt, ModernReport& report) {
     const Real from = time;
     time += dt;
     ++steps;
     report.emitted = emit(from, time);
     frames.renew(time, x);
+    settle(report);
 
     report.dt = dt;
     report.awake = set.awake;
@@ -549,8 +609,11 @@ void ModernLava::add(std::span<const Vec3> x, std::span<const Vec3> v, std::span
   CHECK_EQ(v.size(), x.size());
   CHECK_EQ(temperature.size(), x.size());
   Impl& m = *impl_;
-  ModernReport unreported;
-  m.catch_up(unreported);
+  if (m.rested > 0) {
+    ModernReport caught_up;
+    m.catch_up(caught_up);
+    m.owed = caught_up.heat;
+  }
   for (std::size_t i = 0; i < x.size(); ++i) {
     CHECK(x[i].allFinite() && v[i].allFinite() && std::isfinite(temperature[i]));
     m.born(x[i], v[i], temperature[i]);
@@ -599,7 +662,7 @@ geometry::Points ModernLava::points() const {
   m.age.resize(n);
   const bool hot = m.o.heat.on;
   for (std::size_t i = 0; i < n; ++i) {
-    m.crust[i] = hot ? std::clamp(std::max(m.heat.crust_thickness()[i] / m.o.spacing, m.heat.solid_fraction()[i]), 0.0, 1.0) : 0;
+    m.crust[i] = hot ? std::clamp(std::max(m.heat.crust_share()[i], m.heat.solid_fraction()[i]), 0.0, 1.0) : 0;
     m.age[i] = m.time - m.census.births()[i];
   }
   geometry::Points points;

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <span>
 #include <vector>
@@ -31,9 +32,10 @@ struct ModernOptions {
   Real crust_viscosity = 0;  ///< [Pa s] of crust; its share of a particle's thickness adds this to the viscosity
   Real crust_strength = 0;   ///< [Pa]: sheared harder, crust gives: it adds at most this over the shear rate
   Real slip_length = 0;      ///< of the ground [m]: 0 no slip, infinity free slip (Navier)
-  Real courant = 0.4;        ///< of  dx / max |v|  and of  sqrt(dx / max |a|)
+  Real ground_speed = std::numeric_limits<Real>::infinity();  ///< [m/s] no ground moves faster: what is far off need not be asked for; 0: it stands
+  Real courant = 0.4;        ///< of  dx / max |v|,  of  sqrt(dx / max |a|)  and, where nu < dx^2 / that, of  sqrt(dx / |g|)
   Real max_step = 1;         ///< [s]
-  Real min_step = 1e-6;      ///< [s]; a step that would have to be shorter is an UnstableError
+  Real min_step = 1e-6;      ///< [s] <= max_step; a step that would have to be shorter is an UnstableError
   Real divergence_tolerance = 1e-4;  ///< of the pressure solve: rms change of density in a step it may leave
   Real density_tolerance = 2e-4;     ///< of taking density back that is too large, rms
   Real viscosity_tolerance = 1e-4;   ///< of the viscosity solve: residual over right-hand side
@@ -52,6 +54,8 @@ struct ModernReport {
   Real dt = 0;                 ///< [s]
   int retries = 0;             ///< steps thrown away because numbers went bad
   std::size_t emitted = 0, left = 0;
+  Real left_enthalpy = 0;      ///< [J] that went with those that left
+  bool solved = true;          ///< both solves reached their tolerance
   std::size_t awake = 0;       ///< particles whose motion was computed
   std::size_t neighbor_pairs = 0;
   int pressure_iterations = 0, viscosity_iterations = 0, density_iterations = 0;
@@ -98,9 +102,9 @@ class ModernLava {
   /// Adds particles, pressure 0; ids follow on. All finite (checked).
   void add(std::span<const Vec3> x, std::span<const Vec3> v, std::span<const Real> temperature);
 
-  /// One step of at most dt_max [s] > 0. A step whose viscosity solve fails, whose result is not finite, or which moves a
-  /// particle by more than half a spacing is undone and tried with half the size, eight times; then UnstableError,
-  /// the particles where they were. UnstableError, too, when speed or acceleration leave less than min_step.
+  /// One step of at most dt_max [s] > 0. A step whose viscosity solve fails (stays above ten times the tolerance), whose result is not finite,
+  /// or which moves a particle by more than half a spacing is undone and tried with half the size, eight times and down to min_step; then
+  /// UnstableError, the particles where they were. UnstableError, too, when speed or acceleration leave less than min_step.
   ModernReport step(Real dt_max);
 
   Real time() const;

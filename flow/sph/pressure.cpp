@@ -19,6 +19,7 @@ constexpr std::size_t kGrain = 256;  // particles a thread takes at a time
 constexpr float kExpansion = 0.5;  // step down the scaled gradient; stable below 2 / |A scaled|, which is about 3
 constexpr float kOnBound = 1e-6f;  // of an unknown: rounding in single precision
 constexpr Real kDigits = 1e-4;     // of the error single precision takes away at a time
+constexpr int kBrief = 4;           // iterations of a solve that is within its tolerance already, but not within the tight one
 constexpr Real kMargin = 0.1;      // of the tolerance, where single precision alone does not reach it
 constexpr Real kGain = 0.5;        // a round of refinement that leaves more was the last
 constexpr Real kFloatNoise = 6e-8;  // of a product's terms: rounding in single precision
@@ -271,7 +272,7 @@ PressureResult PressureSolver::solve(const ParticleSystem& s, std::span<const Re
 }
 
 PressureResult PressureSolver::solve_prepared(const ParticleSystem& s, std::span<const Real> rate, std::span<const Real> least, Real dt, Real tolerance,
-                                              int max_iterations, std::span<Vec3> v, std::span<Real> q) {
+                                              int max_iterations, std::span<Vec3> v, std::span<Real> q, Real tight) {
   ZONE("sph.pressure");
   const std::size_t n = s.size();
   CHECK_EQ(y_.size(), n);
@@ -309,7 +310,9 @@ PressureResult PressureSolver::solve_prepared(const ParticleSystem& s, std::span
     const bool stuck = !(start < kGain * kGain * last);
     last = start;
     const Real aim = first ? goal : kMargin * kMargin * goal;  // a round that was worth measuring for leaves a margin
-    const Sums sums = iterate(s, dt, std::max(aim, kDigits * kDigits * start), stuck ? 0 : max_iterations, result.iterations);
+    const bool brief = first && start <= goal;
+    const Sums sums = brief ? iterate(s, dt, tight * tight * count, std::min(kBrief, max_iterations), result.iterations)
+                            : iterate(s, dt, std::max(aim, kDigits * kDigits * start), stuck ? 0 : max_iterations, result.iterations);
     first = false;
     result.error = std::sqrt(sums.third / count);
     result.converged = sums.third <= goal;

@@ -58,8 +58,10 @@ class PressureSolver {
   /// What depends on positions, walls and fixed particles only. solve() does it itself; solve_prepared() and displace() may
   /// follow as often as wanted, on the same system.
   void prepare(const ParticleSystem& system);
+  /// tight: where the error is within the tolerance from the start, but above tight, up to four iterations are done all the same:
+  /// in short steps, each of which may leave as much, a flow at rest comes to rest.
   PressureResult solve_prepared(const ParticleSystem& system, std::span<const Real> rate, std::span<const Real> least, Real dt, Real tolerance, int max_iterations,
-                                std::span<Vec3> v, std::span<Real> q);
+                                std::span<Vec3> v, std::span<Real> q, Real tight = std::numeric_limits<Real>::infinity());
   /// The same for a displacement from where particles are, in no time: D shift <= rate [1], by pressures >= 0, walls at
   /// rest. shift [m] n, out; single precision. error: rms of what is left of D shift - rate where that counts.
   PressureResult displace(const ParticleSystem& system, std::span<const Real> rate, Real tolerance, int max_iterations, std::span<Vec3> shift);

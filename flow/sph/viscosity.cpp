@@ -83,7 +83,7 @@ Vec3 ViscositySolver::Factor::solve(const Vec3& r) const {
 }
 
 ViscosityResult ViscositySolver::solve(const ParticleSystem& s, Real density, std::span<const Real> mu, Real slip_length, Real dt, std::span<const Vec3> v0, Real tolerance,
-                                       int max_iterations, std::span<Vec3> v) {
+                                       int max_iterations, std::span<Vec3> v, Real scale) {
   ZONE("sph.viscosity");
   const std::size_t n = s.size();
   CHECK_EQ(mu.size(), n);
@@ -168,6 +168,8 @@ ViscosityResult ViscositySolver::solve(const ParticleSystem& s, Real density, st
   });
   // Where fixed particles alone drive the others, they are in the first residual only.
   if (b2.plain == 0) b2 = rr;
+  const Real most = scale * scale * static_cast<Real>(n);
+  if (b2.plain > most) b2 = {b2.preconditioned * most / b2.plain, most};
   const Real goal = tolerance * tolerance;
   const auto reached = [&] { return rr.preconditioned <= goal * b2.preconditioned && rr.plain <= goal * b2.plain; };
   while (!reached() && result.iterations < max_iterations) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -38,9 +39,10 @@ class ViscositySolver {
  public:
   /// v: in: first guess (velocities of fixed particles: prescribed, kept); out: solution.
   /// Stops at |r| <= tolerance |b| with b = v0 + the moving walls' drag, in the preconditioner's norm and in the plain
-  /// one: what momentum goes astray is the sum of r, and stiff particles hardly count in the first.
+  /// one: what momentum goes astray is the sum of r, and stiff particles hardly count in the first. Where |b| is more than `scale`
+  /// [m/s] a particle (rms), scale stands for it: fast lava in a short step must not lose what the step's forces add.
   ViscosityResult solve(const ParticleSystem& system, Real density, std::span<const Real> mu, Real slip_length, Real dt, std::span<const Vec3> v0, Real tolerance,
-                        int max_iterations, std::span<Vec3> v);
+                        int max_iterations, std::span<Vec3> v, Real scale = std::numeric_limits<Real>::infinity());
   std::size_t memory() const;
 
  private:

@@ -25,11 +25,11 @@ using Layer = FlowMap::Layer;
 
 namespace {
 
-constexpr std::string_view kMagic = "effuse flow record 1";
+constexpr std::string_view kMagic = "effuse flow record 2";
 constexpr const char* kHeader =
     "frame,time_s,front_m,front_x,front_y,inundated_m2,covered_m2,volume_m3,discharge_m3_s,max_speed_m_s,mean_temperature_K,max_temperature_K,min_temperature_K,"
-    "radiated_J,convected_J,ground_J,vent_J,stored_J,viscous_J\n";
-constexpr const char* kHeatBudget[] = {"radiated_J", "convected_J", "ground_J", "vent_J", "stored_J", "viscous_J"};
+    "radiated_J,convected_J,ground_J,vent_J,stored_J,viscous_J,left_J\n";
+constexpr const char* kHeatBudget[] = {"radiated_J", "convected_J", "ground_J", "vent_J", "stored_J", "viscous_J", "left_J"};
 
 const flow::Effect* first_with_particles(const flow::Simulation& simulation) {
   for (const auto& effect : simulation.effects())

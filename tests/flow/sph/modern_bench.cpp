@@ -171,6 +171,7 @@ void ModernStep(benchmark::State& state) {
   options.spacing = kSpacing;
   options.support = 0.1 * static_cast<Real>(state.range(0));
   options.heat.on = false;
+  options.ground_speed = 0;
   const ContactSource plane = [](std::span<const Vec3> x, Real reach, std::span<geometry::Contact> out) {
     for (std::size_t i = 0; i < x.size(); ++i)
       out[i] = x[i].z() < reach ? geometry::Contact{Vec3(x[i].x(), x[i].y(), 0), Vec3::UnitZ(), x[i].z(), Vec3::Zero(), 0, 0} : geometry::Contact{};

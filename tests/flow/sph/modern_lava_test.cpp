@@ -169,6 +169,34 @@ TEST(ModernLavaSlow, FilmsTenDeepHaveNusseltsFluxAndSurfaceSpeedFromDisorderToo)
     }
 }
 
+TEST(ModernLavaSlow, ThinFilmsHoldOnToTheGroundByTheirStrengthOnly) {
+  // Bingham films on 25 degrees, 1.5 m deep: flux over that of the exact film, by layers and by strength over wall stress.
+  struct BinghamFilm {
+    int layers;
+    Real r, within;
+  };
+  for (const BinghamFilm& film : {BinghamFilm{3, 0.4, 0.08}, BinghamFilm{4, 0.4, 0.08}, BinghamFilm{6, 0.5, 0.05}, BinghamFilm{6, 0.7, 0.1}, BinghamFilm{10, 0.5, 0.05}}) {
+    const Real slope = 25 * kPi / 180, depth = 1.5, dx = depth / film.layers, mu = 4000;
+    ModernOptions o = isothermal(dx, mu);
+    o.density = 1069;
+    o.gravity = kGravity * Vec3(std::sin(slope), 0, -std::cos(slope));
+    const Real wall_stress = o.density * kGravity * std::sin(slope) * depth;
+    o.rheology.yield.kind = YieldKind::kConstant;
+    o.rheology.yield.tau = film.r * wall_stress;
+    o.rheology.regularisation = 1000;
+    o.rheology.mu_max = 1e10;
+    o.max_step = 1;
+    o.period = Vec2::Constant(7 * dx);
+    ModernLava lava(o, {}, {floor_at()});
+    fill(lava, lattice_block(7, 7, film.layers, dx));
+    while (lava.time() < 60) lava.step(60 - lava.time());
+    // Buckingham: plug of r of the depth.
+    const Real exact = wall_stress * depth * depth / (3 * mu) * (1 - 1.5 * film.r + 0.5 * std::pow(film.r, 3));
+    const Real flux = mean(lava.velocities()).x() * depth;
+    EXPECT_NEAR(flux / exact, 1, film.within) << film.layers << " layers, r = " << film.r;
+  }
+}
+
 // ---- spreading ----
 
 Real dam_break_front(Real dx, Real until) {
@@ -334,6 +362,79 @@ TEST(ModernLava, APistonPushesAndABeltDragsLavaAlong) {
   fill(belt, lattice_block(6, 6, 4, 0.1));
   while (belt.time() < 10) belt.step(0.02);
   for (const Vec3& v : belt.velocities()) EXPECT_NEAR(v.y(), 0.3, 0.01);
+}
+
+TEST(ModernLava, AWallThatComesFromAfarIsMetByLavaThatStandsStill) {
+  for (const Real known : {std::numeric_limits<Real>::infinity(), 0.2}) {
+    auto place = std::make_shared<Real>(-0.7);
+    const ContactSource piston = [place](std::span<const Vec3> x, Real reach, std::span<geometry::Contact> out) {
+      plane(Vec3(*place, 0, 0), Vec3::UnitX(), Vec3(0.2, 0, 0), 1)(x, reach, out);
+    };
+    ModernOptions o = isothermal(0.1, 1000);
+    o.gravity = Vec3::Zero();
+    o.max_step = 0.05;
+    o.ground_speed = known;
+    ModernLava lava(o, {}, {piston});
+    fill(lava, lattice_block(4, 4, 4, 0.1));
+    while (lava.time() < 4.5) {
+      lava.step(0.05);
+      *place = -0.7 + 0.2 * lava.time();
+      for (const Vec3& x : lava.positions()) ASSERT_GT(x.x(), *place - 0.02) << "at " << lava.time() << " s";
+    }
+    EXPECT_NEAR(mean(lava.velocities()).x(), 0.2, 0.03);
+  }
+}
+
+// ---- short steps ----
+
+TEST(ModernLava, ShorterStepsDoNotLoseWhatAStepAdds) {
+  // Thrown sideways in empty space: however little gravity adds in a step, and however loose the tolerance, it adds up.
+  for (const Real step : {5e-5, 1e-3}) {
+    ModernOptions o = isothermal(0.1, 1000);
+    o.viscosity_tolerance = 1e-2;
+    ModernLava lava(o, {}, {});
+    fill(lava, lattice_block(4, 4, 4, 0.1), Vec3::Zero(), Vec3(5, 0, 0), 1400);
+    for (int k = 0; k < 40; ++k) lava.step(step);
+    EXPECT_NEAR(mean(lava.velocities()).z(), -kGravity * 40 * step, 0.02 * kGravity * 40 * step) << "steps of " << step;
+  }
+}
+
+TEST(ModernLava, AColumnRestsInStepsOfAnyLength) {
+  for (const Real step : {0.05, 5e-3, 5e-4}) {
+    ModernOptions o = isothermal(0.1, 100);
+    o.period = Vec2(0.8, 0.8);
+    ModernLava lava(o, {}, {floor_at()});
+    fill(lava, lattice_block(8, 8, 10, 0.1));
+    while (lava.time() < 0.5) lava.step(step);
+    Real fastest = 0, pressure = 0;
+    for (std::size_t i = 0; i < lava.size(); ++i) {
+      fastest = std::max(fastest, lava.velocities()[i].norm());
+      pressure += lava.pressures()[i] / static_cast<Real>(lava.size());
+    }
+    EXPECT_LT(fastest, 1e-3 * std::sqrt(kGravity)) << "steps of " << step;
+    EXPECT_NEAR(pressure, o.density * kGravity / 2, 0.03 * o.density * kGravity / 2) << "steps of " << step;
+  }
+}
+
+TEST(ModernLava, ASolveThatIsCutShortIsTriedAgainOrTold) {
+  ModernOptions o = isothermal(0.1, 1000);
+  o.max_iterations = 1;
+  o.min_step = 1e-3;
+  o.max_step = 0.02;
+  ModernLava lava(o, {}, {floor_at()});
+  fill(lava, lattice_block(8, 8, 8, 0.1));
+  bool told = false;
+  try {
+    for (int k = 0; k < 5; ++k) {
+      const ModernReport report = lava.step(0.02);
+      EXPECT_GE(report.dt, o.min_step);
+      EXPECT_LE(report.viscosity_residual, 10 * o.viscosity_tolerance);
+      told = told || !report.solved;
+    }
+  } catch (const UnstableError&) {
+    told = true;
+  }
+  EXPECT_TRUE(told);
 }
 
 TEST(ModernLava, FreeSlipGroundLetsAFilmFallLikeABlock) {
@@ -580,6 +681,44 @@ TEST(ModernLava, SleepersCoolInLongStepsAsTheyWouldInShortOnesAndTheBudgetCloses
   }
   EXPECT_GT(cooled[0], 5);
   EXPECT_NEAR(cooled[0], cooled[1], 0.02 * cooled[1]);
+}
+
+TEST(ModernLava, PressuresAreThereWhileSomeSleepAndHeatCrossesAll) {
+  Vent vent = crater(0.05, 0.4, Vec3(0.6, 0.6, 0));
+  vent.start = 100;
+  ModernOptions o = sleepy();
+  o.heat.on = true;
+  o.heat.longest_interval = 0.1;
+  ModernLava lava(o, {vent}, {floor_at()});
+  fill(lava, lattice_block(30, 6, 3, 0.2));
+  let_sleep(lava);
+  while (lava.time() < 100) lava.step(100 - lava.time());
+  bool some = false;
+  while (lava.time() < 102) {
+    const ModernReport report = lava.step(0.25);
+    some = some || (report.awake > 0 && report.awake < lava.size());
+    for (const Real p : lava.pressures()) ASSERT_TRUE(std::isfinite(p) && p >= 0);
+  }
+  EXPECT_TRUE(some);
+}
+
+TEST(ModernLava, HeatThatIsCaughtUpOnWhenLavaIsAddedIsInTheNextReport) {
+  ModernOptions o = sleepy();
+  o.heat.on = true;
+  o.max_step = 5;
+  ModernLava lava(o, {}, {floor_at()});
+  fill(lava, lattice_block(8, 6, 3, 0.2), Vec3::Zero(), Vec3::Zero(), 1300);
+  let_sleep(lava);
+  const auto lost = [](const ModernReport& r) { return r.heat.radiated + r.heat.convected + r.heat.ground - r.heat.dissipated; };
+  // Between two of its long steps.
+  while (lost(lava.step(5)) == 0) {}
+  const Real enthalpy = lava.heat().total_enthalpy();
+  for (int k = 0; k < 7; ++k) EXPECT_EQ(lost(lava.step(5)), 0);
+  fill(lava, {Vec3(9, 9, 0.1)}, Vec3::Zero(), Vec3::Zero(), 1300);
+  const Real brought = lava.heat().particle_mass() * lava.heat().enthalpy().back();
+  const Real gone = lost(lava.step(0.1));
+  EXPECT_GT(gone, 0);
+  EXPECT_NEAR(enthalpy + brought - lava.heat().total_enthalpy(), gone, 1e-6 * gone);
 }
 
 TEST(ModernLava, ANewVentWakesWhatItTouches) {
