@@ -33,6 +33,7 @@ constexpr Real kFillUp = 0.2;        // share of a density that is too low that 
 constexpr Real kFailed = 10;          // times its tolerance: a solve that stays above has failed
 constexpr Real kSteep = 0.5;          // how far the shear rate at a wall lies from the mean over the support to the wall's own; 0.35: thin films hold on too hard, 1: too little
 constexpr Real kTight = 0.25;          // times dt sqrt(g / dx): share of the divergence tolerance that some iterations are spent on
+constexpr Real kSlow = 0.5;           // sqrt(g dx): slower lava all but stands
 constexpr Real kWake = 2;            // times sleep_speed
 constexpr int kNap = 16;             // steps of max_step that sleepers' heat takes at a time while nobody is awake
 constexpr std::string_view kModel = "modern 3";  // of a checkpoint: changes with what is saved
@@ -397,9 +398,9 @@ struct ModernLava::Impl {
     const Real speed = largest_norm(v);
     if (speed > 0) dt = std::min(dt, o.courant * o.spacing / speed);
     if (acceleration > 0) dt = std::min(dt, o.courant * std::sqrt(o.spacing / acceleration));
-    // Waves that viscosity does not swallow within such a step: lava that seems to stand has them, too.
+    // Lava that all but stands has waves, too, from particle to particle, unless viscosity swallows them within such a step.
     const Real g = o.gravity.norm();
-    if (g > 0 && dt > o.courant * std::sqrt(o.spacing / g)) {
+    if (g > 0 && speed < kSlow * std::sqrt(g * o.spacing) && dt > o.courant * std::sqrt(o.spacing / g)) {
       const Real falling = o.courant * std::sqrt(o.spacing / g);
       const Real thinnest = -parallel_max(size(), -std::numeric_limits<Real>::infinity(), [&](std::size_t i) { return asleep[i] ? -std::numeric_limits<Real>::infinity() : -mu[i]; });
       if (thinnest / o.density * falling < o.spacing * o.spacing) dt = falling;

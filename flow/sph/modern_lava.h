@@ -33,13 +33,13 @@ struct ModernOptions {
   Real crust_strength = 0;   ///< [Pa]: sheared harder, crust gives: it adds at most this over the shear rate
   Real slip_length = 0;      ///< of the ground [m]: 0 no slip, infinity free slip (Navier)
   Real ground_speed = std::numeric_limits<Real>::infinity();  ///< [m/s] no ground moves faster: what is far off need not be asked for; 0: it stands
-  Real courant = 0.4;        ///< of  dx / max |v|,  of  sqrt(dx / max |a|)  and, where nu < dx^2 / that, of  sqrt(dx / |g|)
+  Real courant = 0.4;        ///< of  dx / max |v|,  of  sqrt(dx / max |a|)  and, in thin lava that all but stands, of  sqrt(dx / |g|)
   Real max_step = 1;         ///< [s]
   Real min_step = 1e-6;      ///< [s] <= max_step; a step that would have to be shorter is an UnstableError
   Real divergence_tolerance = 1e-4;  ///< of the pressure solve: rms change of density in a step it may leave
   Real density_tolerance = 2e-4;     ///< of taking density back that is too large, rms
   Real viscosity_tolerance = 1e-4;   ///< of the viscosity solve: residual over right-hand side
-  int density_iterations = 2;        ///< at most, of that: it goes on in the next step
+  int density_iterations = 4;        ///< at most, of that: it goes on in the next step
   int max_iterations = 1000;         ///< of the pressure and viscosity solves
   int coupling = 1;          ///< pressure and viscosity are solved this often a step
   Real sleep_speed = 0;      ///< [m/s]: particles that are slower for sleep_delay fall asleep; 0: never
