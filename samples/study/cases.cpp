@@ -11,6 +11,7 @@ std::vector<Case> validation_cases() {
   add_cooling_cases(cases);
   add_rheology_cases(cases);
   add_terrain_cases(cases);
+  add_work_cases(cases);
   return cases;
 }
 

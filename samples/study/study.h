@@ -59,5 +59,6 @@ void add_heat_cases(std::vector<Case>& cases);       // erf, Stefan, radiation, 
 void add_cooling_cases(std::vector<Case>& cases);    // BM3
 void add_rheology_cases(std::vector<Case>& cases);   // GRD08
 void add_terrain_cases(std::vector<Case>& cases);    // volume and energy on Maunga Whau
+void add_work_cases(std::vector<Case>& cases);       // seconds at equal error, classic against modern
 
 }  // namespace effuse::study

@@ -111,7 +111,7 @@ inline const std::vector<Package>& packages() {
       {"TBB", {"tbb/", "oneapi/"}, {"geometry/base", "skin"}},
       {"Embree", {"embree3/", "embree4/"}, {"skin"}},
       {"libpng", {"png.h"}, {"skin"}},
-      {"zlib", {"zlib.h"}, {"skin"}},
+      {"zlib", {"zlib.h"}, {"skin", "importers"}},
       {"assimp", {"assimp/"}, {"importers"}},
       {"GDAL", {"gdal", "ogr", "cpl_"}, {"importers"}},
       {"toml++", {"toml++/", "toml.hpp"}, {"importers"}},

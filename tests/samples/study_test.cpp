@@ -29,8 +29,8 @@ namespace fs = std::filesystem;
 
 // ---- Every figure of every case holds its bar. The plots are looked at on the page that `effuse study` makes. ----
 
-/// Minutes each: `effuse study validation --full` runs them, too.
-constexpr std::string_view kLong[] = {"huppert-release", "huppert-source", "bm2", "bm3"};
+/// Minutes each, or a matter of timing: `effuse study validation --full` runs them, too.
+constexpr std::string_view kLong[] = {"huppert-release", "huppert-source", "bm2", "bm3", "work-film", "work-bm1"};
 
 /// Figures that miss their bar, and the error they have now. The page calls them missed; here they may get better, and not
 /// worse by more than a quarter.
@@ -39,8 +39,7 @@ struct Shortfall {
   double error;
 };
 constexpr Shortfall kShort[] = {
-    {"rest-thin", "fastest particle", 0.0788},  // hold 0.001: layers of a lattice slide into a denser packing
-    {"rest-thin", "largest drift of the level", 0.322},  // hold 0.1
+    {"rest-thin", "fastest particle", 0.00126},  // hold 0.001
     {"bingham", "r = 0.6: lower edge of the plug", 1.41},  // hold 1 spacing: the shear rate is a mean over the support
     {"crust", "50 cm: exponent of the thickness, 10 h to 48 h", 0.0732},  // hold 0.03: the isotherm stands between two particles
 };

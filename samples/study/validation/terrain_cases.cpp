@@ -5,6 +5,8 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
+#include <span>
+#include <vector>
 
 #include "flow/effects/registry.h"
 #include "flow/scene/scene.h"
@@ -47,8 +49,8 @@ std::unique_ptr<Loaded> load(const fs::path& file, const std::vector<std::string
   return loaded;
 }
 
-/// Where the scene's first vent lets particles go, on average [m]: a spacing above the ground along its line.
-Real release_height(const flow::Node& root, const geometry::Terrain& terrain, Real spacing) {
+/// Where the scene's first vent lets particles go: a spacing above the ground along its line.
+std::vector<Vec3> release_places(const flow::Node& root, const geometry::Terrain& terrain, Real spacing) {
   const flow::Node& vent = root.find("lava")->find("vent")->items.at(0);
   const auto end = [&](const char* key) {
     const auto coordinate = [&](const flow::Node& node) {
@@ -58,12 +60,24 @@ Real release_height(const flow::Node& root, const geometry::Terrain& terrain, Re
     return Vec2(Vec2(coordinate(point.items.at(0)), coordinate(point.items.at(1))) - terrain.georeference().origin.head<2>());
   };
   constexpr int kSamples = 41;
-  Real sum = 0;
+  std::vector<Vec3> places;
   for (int k = 0; k < kSamples; ++k) {
     const Vec2 at = end("from") + k / (kSamples - 1.0) * (end("to") - end("from"));
-    sum += terrain.height(at.x(), at.y()).value();
+    places.emplace_back(at.x(), at.y(), terrain.height(at.x(), at.y()).value() + spacing);
   }
-  return sum / kSamples + spacing;
+  return places;
+}
+
+/// Mean depth of lava over these places [m]: what a vent has to lift besides its own.
+Real overburden(const std::vector<Vec3>& places, std::span<const Vec3> particles, Real spacing) {
+  Real sum = 0;
+  for (const Vec3& place : places) {
+    Real top = place.z();
+    for (const Vec3& x : particles)
+      if ((x - place).head<2>().norm() < spacing) top = std::max(top, x.z() + spacing / 2);
+    sum += top - place.z();
+  }
+  return sum / static_cast<Real>(places.size());
 }
 
 /// Volume the scene's first vent has let out by t [m^3], from what the scene says.
@@ -90,6 +104,8 @@ CaseResult maunga_whau() {
       lost{"lost to sky, air and ground", {}, {}, true, false};
   Curve sky{"radiated", {}, {}, false, false}, air{"convected", {}, {}, false, false}, ground{"into the ground", {}, {}, false, false};
   std::map<std::string, double> f;
+  const std::vector<Vec3> places = release_places(loaded->root, *loaded->terrain, lava.spacing());
+  double lifted = 0, let_out_before = 0;  // the vent's work [J]
   double worst_volume = 0, worst_energy = 0, deepest = 0;
   std::size_t under_ground = 0, beside = 0, most = 0;
   while (simulation.frame() < loaded->scene.frames) {
@@ -112,6 +128,9 @@ CaseResult maunga_whau() {
         ground.y.push_back(f["ground_J"]);
 
     const geometry::Points points = lava.points();
+    const double density = f["mass_present_kg"] / f["volume_m3"];
+    lifted += density * kGravity * overburden(places, points.position, lava.spacing()) * (wanted - let_out_before);
+    let_out_before = wanted;
     most = std::max(most, points.size());
     for (const Vec3& x : points.position) {
       const auto height = loaded->terrain->height(x.x(), x.y());
@@ -122,10 +141,11 @@ CaseResult maunga_whau() {
     }
   }
 
-  // Lava this stiff gives what it falls to friction, nearly all.
-  const Real top = release_height(loaded->root, *loaded->terrain, lava.spacing());
+  // Lava this stiff gives what it falls to friction, nearly all; and what the vent does to press it out under what lies there.
+  Real top = 0;
+  for (const Vec3& place : places) top += place.z() / static_cast<Real>(places.size());
   const geometry::Points points = lava.points();
-  double fallen = 0, moving = 0;
+  double fallen = lifted, moving = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const double mass = f["mass_present_kg"] / static_cast<double>(points.size());
     fallen += mass * kGravity * (top - points.position[i].z());
@@ -137,16 +157,16 @@ CaseResult maunga_whau() {
       compared("present and left against rate and time, worst from 120 s on", "m3", present.y.back(), released.y.back(), 1e-3),
       bounded("particles under the ground, all frames", static_cast<Real>(under_ground), 0, "particles"),
       compared("heat lost against heat missing, worst of all frames", "J", lost.y.back(), missing.y.back(), 0.01),
-      compared("friction and motion against the fall", "J", f["viscous_J"] + moving, fallen, 0.01)};
+      compared("friction and motion against the fall and the vent's work", "J", f["viscous_J"] + moving, fallen, 0.01)};
   result.measures[0].error = worst_volume;
   result.measures[2].error = worst_energy;
   result.plots = {{"maunga_whau_volume", "Maunga Whau: volume", "time [s]", "volume [m3]", false, false, {released, present}},
                   {"maunga_whau_heat", "Maunga Whau: heat lost", "time [s]", "heat [J]", false, false, {missing, lost, sky, air, ground}}};
   result.note = fmt::format(
       "{} particles of 1.5 m on the mountain's 10 m cells, {:.0f} steps, {:.0f} tried again; {:.0f} pressure and {:.0f} viscosity "
-      "iterations a step; of the fall {:.2g} % is in motion; "
+      "iterations a step; of the fall {:.2g} % is in motion, {:.2g} % the vent's work; "
       "compression {:.2g} rms at the end, {:.2g} at worst; {:.3g} kg left over the edge{}{}.",
-      most, f["steps"], f["retries"], f["pressure_iterations"], f["viscosity_iterations"], 100 * moving / fallen, f["density_error"],
+      most, f["steps"], f["retries"], f["pressure_iterations"], f["viscosity_iterations"], 100 * moving / fallen, 100 * lifted / fallen, f["density_error"],
       f["largest_density_error"], f["mass_left_kg"],
       beside > 0 ? fmt::format(", {} times a particle was seen beside the terrain on its way out", beside) : "",
       under_ground > 0 ? fmt::format(", deepest {:.3g} m under the ground", deepest) : "");

@@ -1,0 +1,347 @@
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "flow/sph/modern_lava.h"
+#include "geometry/base/files.h"
+#include "geometry/mesh/measure.h"
+#include "geometry/mesh/validate.h"
+#include "importers/mesh/import_mesh.h"
+#include "skin/write/write_points.h"
+#include "tests/importers/points/hand_written.h"
+
+/// `effuse skin`: other programs' particles become meshes.
+namespace effuse {
+namespace {
+
+namespace fs = std::filesystem;
+using geometry::TriMesh;
+using importers::import_mesh;
+using nlohmann::json;
+namespace hand_written = importers::hand_written;
+using Arguments = std::vector<std::string>;
+
+class SkinCommandTest : public testing::Test {
+ protected:
+  SkinCommandTest() {
+    const testing::TestInfo* info = testing::UnitTest::GetInstance()->current_test_info();
+    folder_ = fs::temp_directory_path() / fmt::format("effuse.{}.{}.{}", info->test_suite_name(), info->name(), ::getpid());
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  ~SkinCommandTest() override { fs::remove_all(folder_); }
+
+  struct Outcome {
+    int code = -1;
+    std::string out, err;
+  };
+
+  /// Runs `effuse skin` with the folder as the current one.
+  Outcome skin(const Arguments& arguments) {
+    std::vector<std::string> words = {EFFUSE_PROGRAM, "skin"};
+    words.insert(words.end(), arguments.begin(), arguments.end());
+    std::vector<char*> argv;
+    for (std::string& word : words) argv.push_back(word.data());
+    argv.push_back(nullptr);
+    const pid_t pid = ::fork();
+    if (pid == 0) {
+      if (::chdir(folder_.c_str()) != 0 || !::freopen("stdout.txt", "w", stdout) || !::freopen("stderr.txt", "w", stderr)) ::_exit(99);
+      ::execv(argv[0], argv.data());
+      ::_exit(98);
+    }
+    int status = 0;
+    ::waitpid(pid, &status, 0);
+    Outcome outcome{WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status), read_file(folder_ / "stdout.txt"), read_file(folder_ / "stderr.txt")};
+    fs::remove(folder_ / "stdout.txt");
+    fs::remove(folder_ / "stderr.txt");
+    return outcome;
+  }
+
+  void write(const std::string& name, const std::string& bytes) { write_file(folder_ / name, bytes); }
+  TriMesh mesh(const std::string& name) { return import_mesh(folder_ / name).mesh; }
+  std::size_t files() const { return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_), fs::directory_iterator())); }
+
+  fs::path folder_;
+};
+
+bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+/// A column of water collapses in a tank: our solver's particles, half a second after the dam is gone.
+class DamBreak {
+ public:
+  DamBreak() {
+    flow::sph::ModernOptions o;
+    o.spacing = 0.1;
+    o.density = 1000;
+    o.rheology = flow::sph::Rheology::newtonian(20);
+    o.heat.on = false;
+    o.rest_period = 0;
+    const auto wall = [](const Vec3& point, const Vec3& normal, Index surface) {
+      return [=](std::span<const Vec3> at, Real reach, std::span<geometry::Contact> out) {
+        for (std::size_t i = 0; i < at.size(); ++i) {
+          const Real d = (at[i] - point).dot(normal);
+          out[i] = {};
+          if (d < reach) out[i] = {Vec3(at[i] - d * normal), normal, d, Vec3::Zero(), 0, surface};
+        }
+      };
+    };
+    flow::sph::ModernLava lava(o, {}, {wall({0, 0, 0}, {0, 0, 1}, 0), wall({0, 0, 0}, {1, 0, 0}, 1), wall({0, 0, 0}, {0, 1, 0}, 2), wall({0, 0.6, 0}, {0, -1, 0}, 3)});
+    std::vector<Vec3> block;
+    for (int n = 0; n < 480; ++n) block.push_back(0.1 * Vec3(n % 8 + 0.5, n / 8 % 6 + 0.5, n / 48 + 0.5));
+    lava.add(block, std::vector<Vec3>(block.size(), Vec3::Zero()), std::vector<Real>(block.size(), 1400.0));
+    while (lava.time() < 0.5) lava.step(0.5 - lava.time());
+    x.assign(lava.positions().begin(), lava.positions().end());
+    v.assign(lava.velocities().begin(), lava.velocities().end());
+    id.assign(lava.ids().begin(), lava.ids().end());
+    radius.assign(x.size(), 0.05);
+  }
+  geometry::Points points() const {
+    geometry::Points p;
+    p.position = x;
+    p.velocity = v;
+    p.radius = radius;
+    p.id = id;
+    return p;
+  }
+  std::vector<Vec3> x, v;
+  std::vector<Real> radius;
+  std::vector<std::uint64_t> id;
+};
+
+void expect_same_mesh(const TriMesh& a, const TriMesh& b, const std::string& what) {
+  EXPECT_EQ(a.positions, b.positions) << what;
+  EXPECT_EQ(a.triangles, b.triangles) << what;
+  EXPECT_EQ(a.normals, b.normals) << what;
+  ASSERT_EQ(a.attributes.size(), b.attributes.size()) << what;
+  for (const auto& [name, attribute] : a.attributes) EXPECT_EQ(attribute.values, b.attributes.at(name).values) << what << " " << name;
+}
+
+TEST_F(SkinCommandTest, ADamBreakHasTheSameSkinFromPlyVtkAndBgeo) {
+  const DamBreak dam;
+  Real front = 0, top = 0;
+  for (const Vec3& x : dam.x) {
+    front = std::max(front, x.x());
+    top = std::max(top, x.z());
+  }
+  ASSERT_GT(front, 1.3) << "it has run";
+  ASSERT_LT(top, 0.95);
+  skin::write_points_ply(folder_ / "dam.ply", dam.points());
+  skin::write_points_vtk(folder_ / "dam.vtk", dam.points());
+  skin::write_points_bgeo(folder_ / "dam.bgeo", dam.points());
+  for (const char* name : {"dam.ply", "dam.vtk", "dam.bgeo"}) {
+    const Outcome outcome = skin({name, "-o", fmt::format("{}.skin.ply", name), "--check", "--json"});
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    const json j = json::parse(outcome.out);
+    EXPECT_EQ(j.at("frames").at(0).at("particles"), 480);
+    EXPECT_NEAR(j.at("frames").at(0).at("radius").get<double>(), 0.05, 1e-8);
+    EXPECT_EQ(j.at("frames").at(0).at("radius_from"), "file");
+    const json& check = j.at("frames").at(0).at("check");
+    EXPECT_TRUE(check.at("closed").get<bool>() && check.at("manifold").get<bool>() && check.at("oriented").get<bool>());
+    EXPECT_EQ(check.at("self_intersections"), 0);
+    // The particles' 0.48 m^3, to 2 %.
+    EXPECT_NEAR(check.at("volume").get<double>(), 0.48, 0.02 * 0.48);
+  }
+  const TriMesh ply = mesh("dam.ply.skin.ply");
+  EXPECT_TRUE(geometry::validate(ply).solid());
+  EXPECT_TRUE(ply.attributes.contains("velocity"));
+  // Within a spacing of where the particles are.
+  EXPECT_NEAR(geometry::bounds(ply).max().x(), front + 0.05, 0.05);
+  expect_same_mesh(ply, mesh("dam.vtk.skin.ply"), "VTK");
+  expect_same_mesh(ply, mesh("dam.bgeo.skin.ply"), "BGEO");
+}
+
+TEST_F(SkinCommandTest, FilesWrittenByHandAllHaveTheSameSkin) {
+  std::optional<TriMesh> first;
+  for (const hand_written::File& file : hand_written::files()) {
+    write(file.name, file.bytes);
+    const Outcome outcome = skin({file.name, "-o", "skin.ply", "--check"});
+    ASSERT_EQ(outcome.code, 0) << file.name << "\n" << outcome.out << outcome.err;
+    EXPECT_TRUE(contains(outcome.out, "check passed")) << outcome.out;
+    const TriMesh found = mesh("skin.ply");
+    EXPECT_GT(found.triangles.size(), 100u);
+    if (!first) first = found;
+    expect_same_mesh(*first, found, file.name);
+  }
+}
+
+TEST_F(SkinCommandTest, SequencesKeepTheirNumbersAndMissingOnesAreReported) {
+  const std::string particles = hand_written::xyz_text();
+  for (const int frame : {2, 3, 5, 9, 10}) write(fmt::format("in.{:04}.xyz", frame), particles);
+  write("in.other.xyz", "not one of them");
+  for (const std::string pattern : {"in.####.xyz", "in.$F4.xyz", "in.%04d.xyz", "in.{}.xyz"}) {
+    const Outcome outcome = skin({pattern, "-o", "out.####.obj", "-o", "{}.vdb", "--output-dir", "made", "--json"});
+    ASSERT_EQ(outcome.code, 0) << pattern << outcome.err;
+    EXPECT_TRUE(contains(outcome.err, "4 frames are missing: 4, 6-8")) << outcome.err;
+    const json j = json::parse(outcome.out);
+    EXPECT_EQ(j.at("missing"), json({4, 6, 7, 8}));
+    ASSERT_EQ(j.at("frames").size(), 5u);
+    EXPECT_EQ(j.at("frames").at(4).at("frame"), 10);
+    for (const char* name : {"out.0002.obj", "out.0010.obj", "2.vdb", "10.vdb"}) EXPECT_TRUE(fs::exists(folder_ / "made" / name)) << name;
+    EXPECT_EQ(std::distance(fs::directory_iterator(folder_ / "made"), fs::directory_iterator()), 10);
+    fs::remove_all(folder_ / "made");
+  }
+  // As a shell spells them out, and a part of them.
+  const Outcome some = skin({"in.0010.xyz", "in.0003.xyz", "in.0005.xyz", "-o", "a.##.ply", "-s", "4", "--end-index=10"});
+  ASSERT_EQ(some.code, 0) << some.err;
+  EXPECT_TRUE(fs::exists(folder_ / "a.05.ply") && fs::exists(folder_ / "a.10.ply") && !fs::exists(folder_ / "a.03.ply"));
+  EXPECT_TRUE(contains(some.err, "missing: 6-9")) << some.err;
+}
+
+TEST_F(SkinCommandTest, WithoutARadiusItIsEstimatedAndSaid) {
+  std::string block;
+  for (int n = 0; n < 1000; ++n) block += fmt::format("{} {} {}\n", 0.2 * (n % 10), 0.2 * (n / 10 % 10), 0.2 * (n / 100));
+  write("block.xyz", block);
+  const Outcome outcome = skin({"block.xyz", "-o", "skin.ply"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_TRUE(contains(outcome.err, "no radii; estimated as half the distance of neighbours: --particle-radius 0.1\n")) << outcome.err;
+  // 1000 cubes of 0.2; edges and corners are rounded off.
+  EXPECT_NEAR(geometry::signed_volume(mesh("skin.ply")), 8, 0.06 * 8);
+  // Told the same radius, it encloses their volume.
+  const Outcome told = skin({"block.xyz", "-o", "skin.ply", "-r", "0.1", "--json"});
+  ASSERT_EQ(told.code, 0) << told.err;
+  EXPECT_EQ(json::parse(told.out).at("frames").at(0).at("radius_from"), "--particle-radius");
+  EXPECT_NEAR(geometry::signed_volume(mesh("skin.ply")), 8, 0.005 * 8);
+}
+
+TEST_F(SkinCommandTest, TheSurfaceThresholdPutsAFlatSurfaceWhereTheDensityFallsToIt) {
+  // A wide slab, its top at z = 0: half a spacing over the last layer. Where the density of a half-space falls to t by the
+  // cubic spline of support 2, found by adding up layers far finer than particles.
+  std::string slab;
+  for (int n = 0; n < 16 * 16 * 6; ++n) slab += fmt::format("{} {} {}\n", n % 16, n / 16 % 16, -0.5 - n / 256);
+  write("slab.xyz", slab);
+  const auto density = [](double height) {
+    double sum = 0;
+    const double step = 0.02;
+    for (double x = step / 2; x < 2; x += step)  // rings round the vertical
+      for (double z = height + step / 2; z < 2; z += step) {
+        const double q = std::sqrt(x * x + z * z);
+        const double w = q < 1 ? 1 - 1.5 * q * q + 0.75 * q * q * q : q < 2 ? 0.25 * std::pow(2 - q, 3) : 0;
+        sum += 2 * x * w * step * step;
+      }
+    return sum;
+  };
+  for (const double threshold : {0.3, 0.5, 0.6, 0.7}) {
+    const Outcome outcome = skin({"slab.xyz", "-r", "0.5", "-t", fmt::format("{}", threshold), "-o", "skin.obj"});
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    Real height = 0;
+    int count = 0;
+    for (const Vec3& x : mesh("skin.obj").positions)
+      if (x.z() > -1 && std::abs(x.x() - 7.5) < 4 && std::abs(x.y() - 7.5) < 4) {
+        height += x.z();
+        ++count;
+      }
+    ASSERT_GT(count, 100);
+    height /= count;
+    const double found = height >= 0 ? density(height) : 1 - density(-height);
+    EXPECT_NEAR(found, threshold, 0.02) << "at " << height;
+  }
+  const Outcome both = skin({"slab.xyz", "-t", "0.5", "--match-volume", "on", "-o", "x.ply"});
+  EXPECT_EQ(both.code, 2);
+  const Outcome far = skin({"slab.xyz", "-t", "0.1", "-l", "1.7", "-o", "x.ply"});
+  EXPECT_EQ(far.code, 2);
+  EXPECT_TRUE(contains(far.err, "--surface-threshold 0.1 with --smoothing-length 1.7")) << far.err;
+}
+
+TEST_F(SkinCommandTest, AFailedCheckIsExitCodeOneAndTheFileIsThereToLookAt) {
+  // At a northing of 5,919,000 a PLY's single precision keeps half metres: a mesh of 10 cm comes apart.
+  std::string far;
+  for (int n = 0; n < 1000; ++n) far += fmt::format("{:.6f} {:.6f} {}\n", 1756000 + 0.1 * (n % 10), 5919000 + 0.1 * (n / 10 % 10), 0.1 * (n / 100));
+  write("far.xyz", far);
+  const Outcome outcome = skin({"far.xyz", "-o", "far.ply", "--check"});
+  EXPECT_EQ(outcome.code, 1);
+  EXPECT_TRUE(contains(outcome.out, "check FAILED")) << outcome.out;
+  EXPECT_TRUE(contains(outcome.out, "pairs of triangles intersect")) << outcome.out;
+  EXPECT_TRUE(fs::exists(folder_ / "far.ply"));
+  const Outcome as_json = skin({"far.xyz", "-o", "far.ply", "--check-mesh", "--json"});
+  EXPECT_EQ(as_json.code, 1);
+  EXPECT_FALSE(json::parse(as_json.out).at("ok").get<bool>());
+  EXPECT_GT(json::parse(as_json.out).at("frames").at(0).at("check").at("self_intersections").get<int>(), 100);
+  // Text has the digits.
+  EXPECT_EQ(skin({"far.xyz", "-o", "far.obj", "--check"}).code, 0);
+}
+
+TEST_F(SkinCommandTest, BrokenFilesAndWrongNamesAreExitCodeTwoAndLeaveNothing) {
+  write("good.xyz", "0 0 0\n1 0 0\n");
+  write("bad.xyz", "0 0 0\n1 zero 0\n");
+  write("cut.vtk", hand_written::vtk_binary().substr(0, 120));
+  write("cut.bgeo", hand_written::bgeo().substr(0, 200));
+  write("one.xyz", "1 2 3\n");
+  write("f.1.xyz", "0 0 0\n1 0 0\n");
+  write("f.01.xyz", "0 0 0\n1 0 0\n");
+  const std::size_t before = files();
+  struct Case {
+    Arguments arguments;
+    std::string says;
+  };
+  const std::vector<Case> cases = {
+      {{"bad.xyz", "-o", "a.ply"}, "error: bad.xyz:2: found 'zero', wanted a number"},
+      {{"cut.vtk", "-o", "a.ply"}, "error: cut.vtk: at byte"},
+      {{"cut.bgeo", "-o", "a.ply"}, "error: cut.bgeo: at byte"},
+      {{"one.xyz", "-o", "a.ply"}, "error: one.xyz: has no radii, and not two places to estimate one from: give --particle-radius"},
+      {{"none.xyz", "-o", "a.ply"}, "error: none.xyz: no such file"},
+      {{"none.####.xyz", "-o", "a.####.ply"}, "error: none.####.xyz: no file has a name like this"},
+      {{"good.xyz", "-o", "a.stl"}, "error: a.stl: skins are written as .ply, .obj, .glb and .vdb, not as '.stl'"},
+      {{"good.xyz", "-o", "a.ply", "-o", "b"}, "error: b: skins are written as"},
+      {{"f.{}.xyz", "-o", "a.####.ply"}, "is frame 1, and so is"},
+      {{"f.####.xyz", "-o", "a.####.ply"}, "no file has a name like this"},
+      {{"f.01.xyz", "bad.xyz", "-o", "a.####.ply"}, "error: bad.xyz: has no number in its name"},
+      {{"f.0#.xyz", "-o", "a.ply"}, "error: a.ply: several frames need a place for their number"},
+      {{"good.xyz", "-o", "a.ply", "-r", "-1"}, "--particle-radius"},
+      {{"good.xyz", "-o", "a.ply", "--normals=off"}, "always written with normals"},
+      {{"good.xyz", "-o", "a.ply", "--particle-aabb-min", "0", "0", "0"}, "go together"},
+      {{"good.xyz", "-o", "a.ply", "--particle-aabb-min", "0", "0", "0", "--particle-aabb-max", "1", "-1", "1"}, "is not below"},
+  };
+  for (const Case& c : cases) {
+    const Outcome outcome = skin(c.arguments);
+    EXPECT_EQ(outcome.code, 2) << c.says << "\n" << outcome.err;
+    EXPECT_TRUE(contains(outcome.err, c.says)) << "'" << outcome.err << "' instead of '" << c.says << "'";
+    EXPECT_EQ(outcome.out, "");
+    EXPECT_EQ(files(), before) << "left something: " << c.says;
+  }
+  write("a.ply", hand_written::ply_ascii());
+  EXPECT_TRUE(contains(skin({"a.ply", "-o", "./a.ply"}).err, "would overwrite the particles"));
+  const Outcome as_json = skin({"bad.xyz", "-o", "b.ply", "--json"});
+  EXPECT_EQ(as_json.code, 2);
+  EXPECT_EQ(json::parse(as_json.out).at("errors").at(0).at("line"), 2);
+}
+
+TEST_F(SkinCommandTest, AFrameWithoutParticlesIsAnEmptyMesh) {
+  write("a.0001.csv", "x,y,z,radius\n");
+  write("a.0002.csv", "x,y,z,radius\n0,0,0,0.5\n");
+  const Outcome outcome = skin({"a.####.csv", "-o", "m.####.ply", "-o", "m.####.glb", "-o", "m.####.vdb", "--check"});
+  ASSERT_EQ(outcome.code, 0) << outcome.out << outcome.err;
+  EXPECT_EQ(mesh("m.0002.ply").attributes.size(), 0u);
+  EXPECT_GT(mesh("m.0002.ply").triangles.size(), 8u);
+  for (const char* name : {"m.0001.ply", "m.0001.glb", "m.0001.vdb"}) EXPECT_TRUE(fs::exists(folder_ / name)) << name;
+  EXPECT_TRUE(contains(read_file(folder_ / "m.0001.ply"), "element face 0\n"));
+}
+
+TEST_F(SkinCommandTest, ABoxCropsParticlesAndUpTurnsGlbOnly) {
+  // Two blobs one over the other; the upper one, by its y, is kept.
+  write("two.xyz", "0 0 0\n0 10 0\n0 10 1\n");
+  ASSERT_EQ(skin({"two.xyz", "-r", "0.5", "-o", "z.glb", "-o", "z.ply", "--particle-aabb-min", "-1", "5", "-1", "--particle-aabb-max", "1", "11", "2"}).code, 0);
+  ASSERT_EQ(skin({"two.xyz", "-r", "0.5", "-o", "y.glb", "-o", "y.ply", "--up", "y", "--particle-aabb-min", "-1", "5", "-1", "--particle-aabb-max", "1", "11", "2"}).code, 0);
+  EXPECT_EQ(read_file(folder_ / "z.ply"), read_file(folder_ / "y.ply"));
+  EXPECT_GT(geometry::bounds(mesh("y.ply")).min().y(), 9);
+  // Our reader turns GLB back to z up: y-up particles come back with their y as z.
+  EXPECT_GT(geometry::bounds(mesh("z.glb")).min().y(), 9);
+  EXPECT_GT(geometry::bounds(mesh("y.glb")).min().z(), 9);
+  EXPECT_GT(geometry::signed_volume(mesh("y.glb")), 0);
+}
+
+TEST_F(SkinCommandTest, TheSameBytesOnOneAndTwoThreads) {
+  write("a.vtk", hand_written::vtk_binary());
+  ASSERT_EQ(skin({"a.vtk", "-o", "one.ply", "--threads", "1"}).code, 0);
+  ASSERT_EQ(skin({"a.vtk", "-o", "two.ply", "--threads", "2"}).code, 0);
+  EXPECT_EQ(read_file(folder_ / "one.ply"), read_file(folder_ / "two.ply"));
+}
+
+}  // namespace
+}  // namespace effuse
