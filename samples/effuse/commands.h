@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -34,6 +35,29 @@ ExitCode check(const CheckCommand& command, const CommonOptions& common);
 
 ExitCode info(const std::vector<std::filesystem::path>& files, const CommonOptions& common);
 ExitCode effects(const CommonOptions& common);
+
+/// `effuse skin`: the skin alone, for anybody's particles; lengths in the particles' own unit. Named as splashsurf's users
+/// know them. Not called skin, which is a namespace.
+struct SkinCommand {
+  std::vector<std::filesystem::path> particles;  ///< files, or names with a place for the number: ####, $F4, %04d, {}
+  std::vector<std::filesystem::path> meshes;     ///< to write: .ply .obj .glb .vdb
+  std::filesystem::path folder;                  ///< for the meshes; empty: as they are
+  double particle_radius = 0;                    ///< half the particle spacing; 0: the file's, or else estimated
+  double smoothing_length = 2;                   ///< in radii; a particle is felt within twice that, as SPH's cubic spline is
+  double cube_size = 1;                          ///< of a voxel, in radii
+  std::optional<double> surface_threshold;       ///< of the density in units of the rest density; absent: volume or 0.5
+  std::optional<bool> match_volume;              ///< enclose the particles' volume; absent: if a radius is known and no threshold given
+  int mesh_smoothing_iters = 2;                  ///< passes of mean-curvature flow on the level set
+  double drop_volume = 0;                        ///< pieces and bubbles of fewer particles are left out
+  bool sph_normals = true;                       ///< from the field's gradient; else of the triangles
+  bool check = false;
+  std::string up = "z";                          ///< of the particles: "y" or "z"
+  std::optional<long long> start_index, end_index;
+  std::vector<double> particle_aabb_min, particle_aabb_max;  ///< three numbers or none
+};
+/// Reads, skins and writes frame after frame. kFailed when a check of the mesh fails: not closed, manifold and oriented, or
+/// triangles that intersect. Files written before a frame that cannot be read stay.
+ExitCode skin_particles(const SkinCommand& command, const CommonOptions& common);
 
 /// `effuse study`; not called study, which is a namespace.
 struct StudyCommand {

@@ -9,6 +9,7 @@
 #include <csignal>
 #include <cstdio>
 #include <cstring>
+#include <map>
 #include <new>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -55,6 +56,44 @@ int flushed(ExitCode code) {
   const int lost = report(error == ENOSPC || error == EDQUOT || error == EFBIG ? ExitCode::kOutOfResources : ExitCode::kFailed,
                           fmt::format("cannot write to standard output: {}", std::strerror(error)), false);
   return code == ExitCode::kDone ? lost : static_cast<int>(code);
+}
+
+/// The words of splashsurf, where ours does the same; each says what it does here.
+void add_skin_options(CLI::App* verb, effuse::SkinCommand& skin) {
+  const std::map<std::string, bool> switches = {{"on", true}, {"off", false}};
+  verb->add_option("particles", skin.particles, "particle files, or one name with ####, $F4, %04d or {} where the frame's number stands")->required();
+  verb->add_option("-o,--output-file", skin.meshes, "mesh to write, by its ending .ply, .obj, .glb, .vdb; may be given several times; for several frames with #### in it")
+      ->required()
+      ->allow_extra_args(false);
+  verb->add_option("--output-dir", skin.folder, "folder of the output files");
+  verb->add_option("-r,--particle-radius", skin.particle_radius, "half the particle spacing, in the unit of the positions; absent: the file's radii, and without them an estimate from the distances of neighbours")
+      ->check(CLI::PositiveNumber);
+  verb->add_option("-l,--smoothing-length", skin.smoothing_length, "in particle radii: a particle is felt within twice this, as with SPH's cubic spline [2]")->check(CLI::Range(1.7, 4.0));
+  verb->add_option("-c,--cube-size", skin.cube_size, "side of the grid's cells, in particle radii [1]")->check(CLI::Range(0.2, 2.0));
+  verb->add_option("-t,--surface-threshold", skin.surface_threshold,
+                   "0.1 to 0.9 (0.25 to 0.85 at the default smoothing length): puts the surface where, over a flat one, SPH's density falls to this share of that inside (0.5: where the particles' volume ends; less is fatter). Our surface is a "
+                   "level set, no isosurface of the density: drops and edges differ. Absent: the surface encloses the particles' volume, (2 radius)^3 each, if the radius is known, else 0.5")
+      ->check(CLI::Range(0.1, 0.9));
+  verb->add_option("--match-volume", skin.match_volume, "on or off: see --surface-threshold")->transform(CLI::CheckedTransformer(switches));
+  verb->add_option("--mesh-smoothing-iters", skin.mesh_smoothing_iters,
+                   "passes of mean-curvature flow on the level set before it is meshed, each of radius^2 / 6 (about three of splashsurf's on its mesh at cube size 0.5); drops keep their size [2]")
+      ->check(CLI::Range(0, 100));
+  verb->add_option("--drop-volume", skin.drop_volume, "leave out closed pieces, and fill bubbles, of less than this many particles' volume [0]")->check(CLI::Range(0.0, 1e9));
+  verb->add_option("--sph-normals", skin.sph_normals, "on: normals of the field's gradient, off: of the triangles; normals are always written [on]")->transform(CLI::CheckedTransformer(switches));
+  verb->add_option_function<bool>(
+          "--normals",
+          [](bool on) {
+            if (!on) throw CLI::ValidationError("--normals", "off: meshes are always written with normals, readers shade them flat without");
+          },
+          "on; normals are always written, see --sph-normals")
+      ->transform(CLI::CheckedTransformer(switches));
+  verb->add_option("--up", skin.up, "y or z: the particles' axis that points up; of the outputs it turns .glb only, which is y up by its standard [z]")->check(CLI::IsMember({"y", "z"}));
+  verb->add_flag("--check,--check-mesh", skin.check, "look whether the mesh is closed, manifold, oriented and free of self-intersections; print what was found; exit code 1 if it is not");
+  verb->add_option("-s,--start-index", skin.start_index, "first frame of a sequence to skin");
+  verb->add_option("-e,--end-index", skin.end_index, "last frame of a sequence to skin");
+  verb->add_option("--particle-aabb-min", skin.particle_aabb_min, "x y z: skin only particles in a box, this is its lower corner")->expected(3);
+  verb->add_option("--particle-aabb-max", skin.particle_aabb_max, "x y z: its upper corner")->expected(3);
+  verb->footer("Exit codes: 0 done, 1 a check of the mesh failed, 2 wrong use or bad input, 5 out of disk or memory.");
 }
 
 bool out_of_resources(const std::system_error& error) {
@@ -107,6 +146,10 @@ int main(int argc, char** argv) {
 
   CLI::App* effects_verb = add_common(app.add_subcommand("effects", "the effects there are, and their parameters"));
 
+  effuse::SkinCommand skin;
+  CLI::App* skin_verb = add_common(app.add_subcommand("skin", "the surface of any program's particles as a mesh: PLY, VTK, VTP, VTU, BGEO, XYZ, CSV in, PLY, OBJ, GLB, VDB out"));
+  add_skin_options(skin_verb, skin);
+
   effuse::StudyCommand study;
   CLI::App* study_verb = add_common(app.add_subcommand("study", "compare effuse with exact, converged and measured references: tables, curves, plots, a page"));
   study_verb->add_option("name", study.names, "studies: validation; all when absent");
@@ -122,10 +165,10 @@ int main(int argc, char** argv) {
 
   // A typing error in the verb: name the nearest one instead of CLI11's list.
   if (argc > 1 && argv[1][0] != '-') {
-    const std::vector<std::string> verbs = {"run", "check", "info", "effects", "study"};
+    const std::vector<std::string> verbs = {"run", "check", "info", "effects", "skin", "study"};
     if (std::find(verbs.begin(), verbs.end(), argv[1]) == verbs.end()) {
       const std::string nearest = effuse::nearest_name(argv[1], verbs);
-      return report(ExitCode::kBadInput, fmt::format("no verb '{}'; {}", argv[1], nearest.empty() ? "there are run, check, info, effects, study" : "did you mean '" + nearest + "'?"), asks_json);
+      return report(ExitCode::kBadInput, fmt::format("no verb '{}'; {}", argv[1], nearest.empty() ? "there are run, check, info, effects, skin, study" : "did you mean '" + nearest + "'?"), asks_json);
     }
   }
   try {
@@ -143,6 +186,7 @@ int main(int argc, char** argv) {
     if (*check_verb) return flushed(effuse::check(check, common));
     if (*info_verb) return flushed(effuse::info(files, common));
     if (*effects_verb) return flushed(effuse::effects(common));
+    if (*skin_verb) return flushed(effuse::skin_particles(skin, common));
     if (*study_verb) return flushed(effuse::run_studies(study, common));
   } catch (const effuse::InputError& error) {
     return report(ExitCode::kBadInput, error.faults(), common.json);

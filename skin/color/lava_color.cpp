@@ -122,11 +122,13 @@ Vec3 lava_emission(Real temperature, const LavaColorOptions& options) {
   return fade * options.strength * std::pow(temperature / options.reference, options.exponent) * blackbody_hue(temperature);
 }
 
-Vec3 lava_albedo(Real temperature, Real crust) {
+Vec3 lava_albedo(Real temperature, Real crust, Real altitude) {
   const Vec3 fresh(0.020, 0.016, 0.013), chilled(0.038, 0.029, 0.021), old(0.062, 0.050, 0.040);
   const Real c = std::clamp(crust, Real{0}, Real{1});
   const Vec3 solid = chilled + (old - chilled) * (1 - smoothstep(400, 900, temperature));
-  return fresh + (solid - fresh) * std::max(c, 1 - smoothstep(900, 1250, temperature));
+  const Vec3 flat = fresh + (solid - fresh) * std::max(c, 1 - smoothstep(900, 1250, temperature));
+  const Real a = std::clamp(altitude, Real{-1}, Real{1});
+  return flat.cwiseProduct(Vec3::Ones() + a * Vec3(0.42, 0.36, 0.30));
 }
 
 Real apparent_temperature(Real temperature, Real crust, Real detail, const LavaColorOptions& options) {
@@ -155,11 +157,12 @@ void color_lava(TriMesh& mesh, const LavaColorOptions& options) {
     const Skin skin = skin_of(T, plates, options);
 
     // Light from plates and cracks; without detail each vertex holds its share of both.
-    Vec3 light, albedo = lava_albedo(T, std::max(solid, plates));
+    Vec3 light;
+    const Real altitude = detail ? std::clamp(static_cast<Real>(detail[i]), Real{-1}, Real{1}) : 0;
+    const Vec3 albedo = lava_albedo(T, std::max(solid, plates), altitude);
     if (detail) {
-      const Real level = 0.5 * (std::clamp(static_cast<Real>(detail[i]), Real{-1}, Real{1}) + 1);
+      const Real level = 0.5 * (altitude + 1);
       light = emission(mix(skin.plate, skin.crack, openness(level, plates, options)));
-      albedo *= 0.7 + 0.6 * level;  // valleys see less of the sky
     } else {
       const Real open = mix(1, 0.5 * options.crack_width, plates);
       light = (1 - open) * emission(skin.plate) + open * emission(skin.crack);

@@ -34,9 +34,10 @@ struct LavaColorOptions {
 /// below; linear, may exceed 1.
 Vec3 lava_emission(Real temperature, const LavaColorOptions& options = {});
 
-/// Reflected colour of lava rock by temperature and crust (0 molten .. 1 solid), linear: black-brown crust, darker when
-/// fresh.
-Vec3 lava_albedo(Real temperature, Real crust);
+/// Reflected colour of lava rock by temperature, crust (0 molten .. 1 solid) and altitude within the clinker (-1 valley .. 1
+/// crest: "detail"), linear: black-brown crust, darker when fresh; crests lighter and browner (dust, rust, and they see all of the
+/// sky), valleys darker and bluer. Rises with altitude in every channel, falls with temperature.
+Vec3 lava_albedo(Real temperature, Real crust, Real altitude = 0);
 
 /// What the eye sees of a surface whose lava is at T [K]: plates are chilled to `plate`, the cracks between them show
 /// nearly T. The share of plates grows from none (crust 0 and hotter than `molten`) to all but the cracks (crust 1, or

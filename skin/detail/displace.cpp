@@ -9,7 +9,9 @@
 #include "geometry/base/zones.h"
 #include "geometry/mesh/measure.h"
 #include "geometry/procedural/noise.h"
+#include "skin/detail/blend.h"
 #include "skin/detail/refine.h"
+#include "skin/detail/relief.h"
 
 namespace effuse::skin {
 
@@ -23,11 +25,7 @@ constexpr Real kCrack = 0.45 * kDeviation;  // width of clinker's valleys in noi
 constexpr Real kMeanPlate = 0.69;           // of 1 - exp(-|n| / kCrack) over the noise's distribution: measured, see the test
 constexpr Real kMostDisplaced = 0.35;       // [spacings]
 constexpr Real kGroundFade = 0.75;          // [spacings]
-
-Real smoothstep(Real from, Real to, Real x) {
-  const Real t = std::clamp((x - from) / (to - from), Real{0}, Real{1});
-  return t * t * (3 - 2 * t);
-}
+constexpr Real kTooCoarse = 1.7;            // times the edge asked for
 
 /// A mesh's attribute of that width, or nothing.
 const float* find_attribute(const TriMesh& mesh, const char* name, int width) {
@@ -41,14 +39,14 @@ const float* find_attribute(const TriMesh& mesh, const char* name, int width) {
 Vec3 vector_at(const float* values, std::size_t i) { return Vec3(values[3 * i], values[3 * i + 1], values[3 * i + 2]); }
 
 /// Noise in the material: where it is taken, and how much of each octave.
-struct Material {
+struct MeshMaterial {
   const float* rest;
   const float* rest2;
   Real share[2];  // of rest and rest2, their squares summing to one
   Real weight[kMostOctaves];
   Real swell_scale, clinker_scale;
 
-  Material(const TriMesh& mesh, const DisplaceOptions& o) : rest(find_attribute(mesh, "rest", 3)), rest2(find_attribute(mesh, "rest2", 3)) {
+  MeshMaterial(const TriMesh& mesh, const DisplaceOptions& o) : rest(find_attribute(mesh, "rest", 3)), rest2(find_attribute(mesh, "rest2", 3)) {
     const Real q = rest && rest2 ? o.rest_ratio : rest2 && !rest ? 1 : 0;
     const Real contrast = std::hypot(1 - q, q);
     share[0] = (1 - q) / contrast;
@@ -66,14 +64,14 @@ struct Material {
   }
 };
 
-struct Relief {
+struct NoiseRelief {
   Real swell;    // deviation 1
   Real clinker;  // 0 in cracks .. 1
 };
 
-Relief relief_at(const TriMesh& mesh, const Material& m, const DisplaceOptions& o, std::size_t i) {
+NoiseRelief relief_at(const TriMesh& mesh, const MeshMaterial& m, const DisplaceOptions& o, std::size_t i) {
   const Vec3 at[2] = {m.rest ? vector_at(m.rest, i) : mesh.positions[i], m.rest2 ? vector_at(m.rest2, i) : mesh.positions[i]};
-  Relief relief{0, 0};
+  NoiseRelief relief{0, 0};
   Real frequency = 1 / (o.wavelength * o.spacing);
   for (int k = 0; k < o.octaves; ++k, frequency *= 2) {
     if (m.weight[k] <= 0) continue;
@@ -116,33 +114,55 @@ std::size_t hold_back(const TriMesh& mesh, std::vector<Real>& height) {
   return static_cast<std::size_t>(std::count(held.begin(), held.end(), std::uint8_t{1}));
 }
 
-}  // namespace
-
-DisplaceReport displace(TriMesh& mesh, const geometry::Terrain* terrain, const DisplaceOptions& o) {
-  ZONE("skin.displace");
+void check(const DisplaceOptions& o) {
   CHECK_GT(o.spacing, 0.0);
   CHECK_GE(o.amplitude, 0.0);
   CHECK_GT(o.wavelength, 0.0);
   CHECK(o.octaves >= 1 && o.octaves <= kMostOctaves);
   CHECK_GT(o.gain, 0.0);
   CHECK_GT(o.molten, o.solid);
+  CHECK_GE(o.fold_wavelength, 0.0);
+  CHECK_GE(o.fold_time, 0.0);
   CHECK_GT(o.edge, 0.0);
   CHECK(o.rest_ratio >= 0 && o.rest_ratio <= 1);
+}
+
+/// Less near the ground: 0 on it, 1 from kGroundFade on.
+Real ground_share(const geometry::Terrain* terrain, const Vec3& x, Real spacing) {
+  if (!terrain) return 1;
+  const geometry::Contact contact = terrain->contact(x, 2 * kGroundFade * spacing);
+  return contact.any() ? smoothstep(0, kGroundFade * spacing, contact.distance) : 1;
+}
+
+void move_along_normals(TriMesh& mesh, std::vector<Real>& height, std::vector<float> detail, DisplaceReport& report) {
+  const std::size_t n = mesh.positions.size();
+  report.held_back = hold_back(mesh, height);
+  parallel_for(n, [&](std::size_t i) { mesh.positions[i] += height[i] * mesh.normals[i]; });
+  report.largest = parallel_max(n, 0, [&](std::size_t i) { return std::abs(height[i]); });
+  geometry::compute_normals(mesh);
+  mesh.attributes["detail"] = {1, std::move(detail)};
+}
+
+}  // namespace
+
+DisplaceReport displace(TriMesh& mesh, const geometry::Terrain* terrain, const DisplaceOptions& o) {
+  ZONE("skin.displace");
+  check(o);
   DisplaceReport report;
   // A dual mesh's mean edge is 1.1 to 1.2 of its voxel: refined only when clearly too coarse, so that frames agree.
   constexpr int kMostRefined = 3;
-  for (Real edge = mean_edge(mesh); edge > 1.7 * o.edge * o.spacing && report.refined < kMostRefined; edge /= 2, ++report.refined)
+  for (Real edge = mean_edge(mesh); edge > kTooCoarse * o.edge * o.spacing && report.refined < kMostRefined; edge /= 2, ++report.refined)
     mesh = refine(mesh);
   if (mesh.normals.empty()) geometry::compute_normals(mesh);
 
   const std::size_t n = mesh.positions.size();
-  const Material material(mesh, o);
+  const MeshMaterial material(mesh, o);
   const float* temperature = find_attribute(mesh, "temperature", 1);
   const float* crust = find_attribute(mesh, "crust", 1);
   std::vector<float> detail(n);
   std::vector<Real> height(n);
   parallel_for(n, [&](std::size_t i) {
-    const Relief relief = relief_at(mesh, material, o, i);
+    const NoiseRelief relief = relief_at(mesh, material, o, i);
     const Real chilled = temperature ? 1 - smoothstep(o.solid, o.molten, static_cast<Real>(temperature[i])) : 1;
     const Real cold = crust ? std::max(chilled, std::clamp(static_cast<Real>(crust[i]), Real{0}, Real{1})) : chilled;
     const Real clinker = o.roughness * cold;
@@ -151,19 +171,34 @@ DisplaceReport displace(TriMesh& mesh, const geometry::Terrain* terrain, const D
 
     const Real shape = (1 - clinker) * swell + clinker * 2 * (relief.clinker - kMeanPlate);
     const Real amount = o.molten_share + (1 - o.molten_share) * cold;
-    Real h = std::clamp(o.amplitude * amount * shape, -kMostDisplaced, kMostDisplaced) * o.spacing;
-    if (terrain) {
-      const geometry::Contact contact = terrain->contact(mesh.positions[i], 2 * kGroundFade * o.spacing);
-      if (contact.any()) h *= smoothstep(0, kGroundFade * o.spacing, contact.distance);
-    }
-    height[i] = h;
+    height[i] = std::clamp(o.amplitude * amount * shape, -kMostDisplaced, kMostDisplaced) * o.spacing * ground_share(terrain, mesh.positions[i], o.spacing);
   });
+  move_along_normals(mesh, height, std::move(detail), report);
+  return report;
+}
 
-  report.held_back = hold_back(mesh, height);
-  parallel_for(n, [&](std::size_t i) { mesh.positions[i] += height[i] * mesh.normals[i]; });
-  report.largest = parallel_max(n, 0, [&](std::size_t i) { return std::abs(height[i]); });
-  geometry::compute_normals(mesh);
-  mesh.attributes["detail"] = {1, std::move(detail)};
+DisplaceReport displace(TriMesh& mesh, const geometry::Points& points, const geometry::Terrain* terrain, const DisplaceOptions& o) {
+  if (o.kind == SkinKind::kNoise) return displace(mesh, terrain, o);
+  ZONE("skin.displace");
+  check(o);
+  DisplaceReport report;
+  RefineOptions fine;
+  fine.edge = kTooCoarse * o.edge * o.spacing;
+  fine.view = o.view;
+  report.refined = refine_to(mesh, fine).rounds;
+  if (mesh.normals.empty()) geometry::compute_normals(mesh);
+
+  const std::size_t n = mesh.positions.size();
+  const Relief relief(points, o);
+  std::vector<float> detail(n);
+  std::vector<Real> height(n);
+  parallel_for(n, [&](std::size_t i) {
+    const Vec3& x = mesh.positions[i];
+    const Relief::Sample sample = relief.at(x, o.view ? std::max(o.edge * o.spacing, o.view->edge_at(x)) : o.edge * o.spacing);
+    detail[i] = static_cast<float>(sample.detail);
+    height[i] = sample.height * ground_share(terrain, x, o.spacing);
+  });
+  move_along_normals(mesh, height, std::move(detail), report);
   return report;
 }
 

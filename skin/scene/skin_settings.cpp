@@ -20,12 +20,20 @@ SkinSettings read_skin_settings(flow::Parameters& root) {
   level_set.drop_volume = skin.number("drop_volume", "", level_set.drop_volume, Parameters::not_negative(), "pieces of fewer particles are left out");
   level_set.match_volume = skin.flag("match_volume", level_set.match_volume, "enclose the particles' volume");
   DisplaceOptions& detail = s.detail;
+  const std::vector<std::string> kinds(kSkinKindNames.begin(), kSkinKindNames.end());
+  detail.kind = static_cast<SkinKind>(skin.choice("kind", kinds, static_cast<std::size_t>(detail.kind),
+                                                  "aa clinkers, pahoehoe ropes, block plates, obsidian folds; noise: swells and a net of cracks"));
   detail.amplitude = skin.number("amplitude", "", detail.amplitude, {0, 10}, "of the bumps where cold, in spacings; 0: none");
   detail.wavelength = skin.number("wavelength", "", detail.wavelength, {0.01, 1e6}, "of the coarsest bumps, in spacings");
   detail.octaves = static_cast<int>(skin.integer("octaves", detail.octaves, 1, 12, "of the bumps, each half as wide"));
   detail.gain = skin.number("gain", "", detail.gain, {0, 1}, "height from octave to octave");
-  detail.roughness = skin.number("roughness", "", detail.roughness, {0, 1}, "0 swells, 1 clinker");
+  detail.roughness = skin.number("roughness", "", detail.roughness, {0, 1}, "share of the fine bumps; noise: 0 swells, 1 clinker");
+  detail.molten_share = skin.number("molten_share", "", detail.molten_share, {0, 1}, "of the bumps' height, where molten");
+  detail.solid = skin.number("solid", "K", detail.solid, {0, 5000, true}, "cooler than this the bumps are fully grown");
+  detail.fold_wavelength = skin.number("fold_wavelength", "", detail.fold_wavelength, {0, 1e6}, "of ropes and folds, in spacings; 0: the kind's own");
+  detail.fold_time = skin.number("fold_time", "s", detail.fold_time, Parameters::not_negative(), "in which the surface's strain rate folds it");
   detail.edge = skin.number("edge", "", detail.edge, {0.05, 10}, "length of the mesh's edges, in spacings");
+  s.edge_pixels = skin.number("edge_pixels", "", s.edge_pixels, {0, 1000}, "edges as long as this many pixels of the picture's camera, where that is more than edge; 0: edge everywhere");
   s.color.strength = skin.number("glow", "", s.color.strength, {0, 1e6}, "light of lava at 1200 degC, white paper in the sun is 1");
 
   s.color.exponent = skin.number("glow_exponent", "", s.color.exponent, {0, 30}, "glow goes with this power of the temperature: 4 flat, 17 physical");
@@ -35,6 +43,7 @@ SkinSettings read_skin_settings(flow::Parameters& root) {
   s.color.crack_width = skin.number("crack_width", "", s.color.crack_width, {0, 1}, "share of the plated surface that is cracks, roughly");
   if (s.color.plated >= s.color.molten) skin.fault("plated", "is not below molten");
   detail.molten = s.color.molten;
+  if (detail.solid >= detail.molten) skin.fault("solid", "is not below molten");
 
   Parameters output = root.table("output", "what is written for each frame");
   const std::vector<std::string> formats = {"ply", "obj", "glb", "vdb"};
@@ -93,6 +102,22 @@ PreviewOptions picture_at(const SkinSettings& s, const geometry::Terrain& terrai
   PreviewOptions picture = s.picture;
   picture.camera = frame_camera(box, s.azimuth + film_time * s.turn, s.elevation, static_cast<Real>(picture.width) / picture.height, 0.02);
   return picture;
+}
+
+DisplaceOptions detail_at(const SkinSettings& s, const geometry::Terrain& terrain, Real film_time) {
+  DisplaceOptions detail = s.detail;
+  if (s.edge_pixels <= 0) return detail;
+  const PreviewOptions picture = picture_at(s, terrain, film_time);
+  View view;
+  view.eye = picture.camera.eye;
+  view.pixel_angle = picture.camera.field_of_view / picture.height;
+  view.pixels = s.edge_pixels;
+  view.direction = picture.camera.target - picture.camera.eye;
+  // The cone round the picture's corners, and a tenth more for what casts shadows into it.
+  const Real half = std::tan(picture.camera.field_of_view / 2), aspect = static_cast<Real>(picture.width) / picture.height;
+  view.half_angle = std::min(1.1 * std::atan(half * std::hypot(Real{1}, aspect)), kPi);
+  detail.view = view;
+  return detail;
 }
 
 }  // namespace effuse::skin

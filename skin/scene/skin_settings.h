@@ -16,7 +16,8 @@ namespace effuse::skin {
 struct SkinSettings {
   LevelSetOptions level_set;  ///< spacing is the effect's, set when there is one
   Real voxel = 0.5;           ///< in spacings
-  DisplaceOptions detail;     ///< spacing, rest_ratio and seed are filled in frame by frame
+  DisplaceOptions detail;     ///< spacing, rest_ratio, seed and view are filled in frame by frame (detail_at)
+  Real edge_pixels = 0;       ///< edges this many pixels of the picture long; 0: no view
   LavaColorOptions color;
 
   bool ply = true, obj = true, glb = true, vdb = true;
@@ -37,6 +38,9 @@ struct SkinSettings {
 };
 
 SkinSettings read_skin_settings(flow::Parameters& root);
+
+/// The detail's options at a moment of the film [s]: with the view of the picture's camera, when edges go by its pixels.
+DisplaceOptions detail_at(const SkinSettings& settings, const geometry::Terrain& terrain, Real film_time);
 
 /// The picture's options at a moment of the film [s].
 PreviewOptions picture_at(const SkinSettings& settings, const geometry::Terrain& terrain, Real film_time);

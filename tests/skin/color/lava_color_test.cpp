@@ -83,6 +83,40 @@ TEST(LavaColor, TheVentGlowsEvenlyTheMiddleIsPlatesAndCracksAndTheFarReachIsDark
   EXPECT_LT(glow(850, 1, -0.9), 0.05) << "the front is dark";
 }
 
+TEST(LavaColor, GlowRisesWithTemperatureWhateverTheAltitudeAndIsNoneBelowTheDraperPoint) {
+  for (const double crust : {0.0, 0.5, 1.0})
+    for (double detail = -1; detail <= 1; detail += 0.25) {
+      double before = 0;
+      for (double T = 300; T < 1700; T += 4) {
+        const double now = lava_emission(apparent_temperature(T, crust, detail)).maxCoeff();
+        ASSERT_GE(now, before - 1e-12) << T << " " << crust << " " << detail;
+        if (T < 798) {
+          ASSERT_EQ(now, 0) << T;
+        }
+        before = now;
+      }
+      EXPECT_GT(before, detail < -0.5 || crust < 0.1 ? 1 : 0) << crust << " " << detail;
+    }
+}
+
+TEST(LavaColor, AlbedoRisesWithAltitudeInTheClinkerAndStaysDark) {
+  for (double T = 300; T < 1600; T += 50)
+    for (const double crust : {0.0, 0.5, 1.0}) {
+      Vec3 before = Vec3::Zero();
+      for (double altitude = -1; altitude <= 1.001; altitude += 0.1) {
+        const Vec3 now = lava_albedo(T, crust, altitude);
+        ASSERT_TRUE((now.array() > before.array()).all()) << T << " " << altitude;
+        ASSERT_LT(now.maxCoeff(), 0.09);
+        before = now;
+      }
+      EXPECT_EQ(lava_albedo(T, crust, 0), lava_albedo(T, crust));
+      EXPECT_EQ(lava_albedo(T, crust, 7), lava_albedo(T, crust, 1));
+      // Crests are browner than valleys.
+      const Vec3 crest = lava_albedo(T, crust, 1), valley = lava_albedo(T, crust, -1);
+      EXPECT_GT(crest.x() / crest.z(), valley.x() / valley.z());
+    }
+}
+
 geometry::TriMesh strip(std::size_t n) {
   geometry::TriMesh mesh;
   geometry::VertexAttribute temperature{1, {}}, crust{1, {}}, detail{1, {}};

@@ -1,0 +1,528 @@
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "geometry/base/log.h"
+#include "geometry/base/zones.h"
+#include "geometry/mesh/measure.h"
+#include "geometry/mesh/self_intersections.h"
+#include "geometry/mesh/validate.h"
+#include "importers/input_file.h"
+#include "importers/points/import_points.h"
+#include "importers/points/spacing.h"
+#include "samples/effuse/commands.h"
+#include "skin/surface/level_set.h"
+#include "skin/write/write_mesh.h"
+
+namespace effuse {
+
+namespace fs = std::filesystem;
+using importers::PointCloud;
+using importers::quote;
+using nlohmann::ordered_json;
+
+namespace {
+
+// Names of frames.
+
+/// A file name with a place for the frame's number: #### (as many digits), $F4 or $F, %04d or %d, {}.
+struct FramePattern {
+  fs::path folder;
+  std::string before, after;
+  std::size_t digits = 0;  // at least so many, zeros in front; 0: as it comes
+
+  fs::path file(long long frame) const { return folder / fmt::format("{}{:0{}}{}", before, frame, std::max<std::size_t>(digits, 1), after); }
+};
+
+std::optional<FramePattern> frame_pattern(const fs::path& path) {
+  const std::string name = path.filename().string();
+  const auto make = [&](std::size_t begin, std::size_t end, std::size_t digits) {
+    return FramePattern{path.parent_path(), name.substr(0, begin), name.substr(end), digits};
+  };
+  const auto digit = [&](std::size_t i) { return i < name.size() && name[i] >= '0' && name[i] <= '9'; };
+  for (std::size_t i = 0; i < name.size(); ++i) {
+    std::size_t end = i;
+    if (name[i] == '#') {
+      while (end < name.size() && name[end] == '#') ++end;
+      return make(i, end, end - i);
+    }
+    if (name.compare(i, 2, "{}") == 0) return make(i, i + 2, 0);
+    if (name.compare(i, 2, "$F") == 0) return digit(i + 2) ? make(i, i + 3, static_cast<std::size_t>(name[i + 2] - '0')) : make(i, i + 2, 0);
+    if (name.compare(i, 2, "%d") == 0) return make(i, i + 2, 0);
+    if (name.compare(i, 2, "%0") == 0 && digit(i + 2) && name.compare(i + 3, 1, "d") == 0) return make(i, i + 4, static_cast<std::size_t>(name[i + 2] - '0'));
+  }
+  return std::nullopt;
+}
+
+/// A number that a file name can hold.
+std::optional<long long> frame_number(std::string_view digits) {
+  if (digits.empty() || digits.size() > 15) return std::nullopt;
+  long long number = 0;
+  for (const char c : digits) {
+    if (c < '0' || c > '9') return std::nullopt;
+    number = 10 * number + (c - '0');
+  }
+  return number;
+}
+
+/// What is skinned: numbered files, or one without a number.
+struct Inputs {
+  std::map<long long, fs::path> frames;
+  std::optional<fs::path> single;
+  std::vector<long long> missing;  // between the first and the last, at most 1000 of them
+  std::size_t missing_count = 0;
+};
+
+void add_frame(Inputs& inputs, long long number, const fs::path& file) {
+  const auto [at, added] = inputs.frames.emplace(number, file);
+  if (!added) throw InputError(Place{file.string()}, fmt::format("is frame {}, and so is {}", number, at->second.string()));
+}
+
+/// The files that a pattern names, as they lie in its folder.
+void add_matching(Inputs& inputs, const fs::path& given, const FramePattern& pattern) {
+  const fs::path folder = pattern.folder.empty() ? fs::path(".") : pattern.folder;
+  std::error_code error;
+  fs::directory_iterator entries(folder, error);
+  if (error) throw InputError(Place{given.string()}, fmt::format("cannot look into its folder: {}", error.message()));
+  std::size_t found = 0;
+  for (const fs::directory_entry& entry : entries) {
+    const std::string name = entry.path().filename().string();
+    if (name.size() <= pattern.before.size() + pattern.after.size() || !name.starts_with(pattern.before) || !name.ends_with(pattern.after)) continue;
+    const std::string_view digits = std::string_view(name).substr(pattern.before.size(), name.size() - pattern.before.size() - pattern.after.size());
+    if (digits.size() < pattern.digits) continue;
+    if (const auto number = frame_number(digits)) {
+      add_frame(inputs, *number, pattern.folder / name);
+      ++found;
+    }
+  }
+  if (found == 0) throw InputError(Place{given.string()}, "no file has a name like this");
+}
+
+/// The last digits in a file's name: what numbers it in a list of files.
+std::optional<long long> own_number(const fs::path& file) {
+  const std::string name = file.filename().string();
+  std::size_t end = name.size();
+  // not of the ending: .bgeo5 is none
+  if (const std::size_t dot = name.rfind('.'); dot != std::string::npos && dot > 0) end = dot;
+  while (end > 0 && !(name[end - 1] >= '0' && name[end - 1] <= '9')) --end;
+  std::size_t begin = end;
+  while (begin > 0 && name[begin - 1] >= '0' && name[begin - 1] <= '9') --begin;
+  return frame_number(std::string_view(name).substr(begin, end - begin));
+}
+
+Inputs find_inputs(const SkinCommand& command) {
+  Inputs inputs;
+  for (const fs::path& given : command.particles) {
+    std::error_code ignored;
+    const std::optional<FramePattern> pattern = fs::exists(given, ignored) ? std::nullopt : frame_pattern(given);
+    if (pattern) {
+      add_matching(inputs, given, *pattern);
+    } else if (command.particles.size() == 1) {
+      inputs.single = given;
+    } else {
+      const std::optional<long long> number = own_number(given);
+      if (!number) throw InputError(Place{given.string()}, "has no number in its name, which several files need");
+      add_frame(inputs, *number, given);
+    }
+  }
+  std::erase_if(inputs.frames, [&](const auto& frame) {
+    return (command.start_index && frame.first < *command.start_index) || (command.end_index && frame.first > *command.end_index);
+  });
+  if (!inputs.single && inputs.frames.empty()) throw InputError(Place{}, "--start-index and --end-index leave no frame");
+  for (auto at = inputs.frames.begin(); at != inputs.frames.end() && std::next(at) != inputs.frames.end(); ++at) {
+    const long long next = std::next(at)->first;
+    inputs.missing_count += static_cast<std::size_t>(next - at->first - 1);
+    for (long long n = at->first + 1; n < next && inputs.missing.size() < 1000; ++n) inputs.missing.push_back(n);
+  }
+  return inputs;
+}
+
+/// "3, 5-7, 12"
+std::string ranges(const std::vector<long long>& numbers) {
+  std::string text;
+  for (std::size_t i = 0; i < numbers.size();) {
+    std::size_t last = i;
+    while (last + 1 < numbers.size() && numbers[last + 1] == numbers[last] + 1) ++last;
+    text += fmt::format("{}{}", text.empty() ? "" : ", ", numbers[i]);
+    if (last > i) text += fmt::format("-{}", numbers[last]);
+    i = last + 1;
+  }
+  return text;
+}
+
+// Where it goes.
+
+enum class Format { kPly, kObj, kGlb, kVdb };
+
+Format format_of(const fs::path& file) {
+  const std::string ending = importers::lower_extension(file);
+  if (ending == ".ply") return Format::kPly;
+  if (ending == ".obj") return Format::kObj;
+  if (ending == ".glb") return Format::kGlb;
+  if (ending == ".vdb") return Format::kVdb;
+  throw InputError(Place{file.string()}, fmt::format("skins are written as .ply, .obj, .glb and .vdb, not as {}", ending.empty() ? "a file without an ending" : quote(ending)));
+}
+
+/// The files of one frame; checks them against one another and against the particles before anything is made.
+std::vector<fs::path> outputs_of(const SkinCommand& command, std::optional<long long> frame, const fs::path& input) {
+  std::vector<fs::path> files;
+  for (const fs::path& given : command.meshes) {
+    format_of(given);
+    const fs::path whole = command.folder.empty() ? given : command.folder / given;
+    const std::optional<FramePattern> pattern = frame_pattern(whole);
+    if (frame && !pattern) throw InputError(Place{given.string()}, "several frames need a place for their number in this name, as in mesh.####.ply");
+    // One file alone keeps its name, whatever is in it.
+    files.push_back(frame ? pattern->file(*frame) : whole);
+    std::error_code ignored;
+    if (fs::equivalent(files.back(), input, ignored)) throw InputError(Place{given.string()}, "would overwrite the particles");
+  }
+  return files;
+}
+
+// From a threshold of SPH's density to a radius of our level set.
+
+/// Share of a cubic-spline kernel of unit support (its mass) beyond a plane at distance s >= 0 from its middle.
+Real kernel_beyond(Real s) {
+  if (s >= 1) return 0;
+  // Shells of radius r have the area 2 pi r (r - s) beyond; W with q = 2 r, 8 / pi in front for unit support.
+  const auto shell = [s](Real r) {
+    const Real q = 2 * r;
+    const Real w = q < 1 ? 1 - 1.5 * q * q + 0.75 * q * q * q : 0.25 * (2 - q) * (2 - q) * (2 - q);
+    return 16 * r * (r - s) * w;
+  };
+  constexpr int kPanels = 200;
+  const Real step = (1 - s) / kPanels;
+  Real sum = shell(s) + shell(1);
+  for (int k = 1; k < kPanels; ++k) sum += (k % 2 == 1 ? 4 : 2) * shell(s + k * step);
+  return sum * step / 3;
+}
+
+/// How far outside a flat surface the density of what lies below it has fallen to that share of its inner value [supports].
+Real threshold_distance(Real share) {
+  if (share > 0.5) return -threshold_distance(1 - share);
+  Real low = 0, high = 1;
+  for (int k = 0; k < 60; ++k) {
+    const Real middle = (low + high) / 2;
+    (kernel_beyond(middle) > share ? low : high) = middle;
+  }
+  return low;
+}
+
+/// The mean of |x - xbar| (build_level_set) at a height over a flat surface, which lies half a spacing over the top layer of a
+/// cubic lattice: the radius that puts the level set there [spacings].
+Real flat_radius(Real influence, Real height) {
+  constexpr int kSide = 4;
+  const int reach = static_cast<int>(influence) + 1;
+  Real sum = 0;
+  for (int a = 0; a < kSide; ++a)
+    for (int b = 0; b < kSide; ++b) {
+      const Vec3 x((a + 0.5) / kSide, (b + 0.5) / kSide, 0.5 + height);
+      Vec3 mean = Vec3::Zero();
+      Real weight = 0;
+      for (int i = -reach; i <= reach + 1; ++i)
+        for (int j = -reach; j <= reach + 1; ++j)
+          for (int k = -2 * reach; k <= 0; ++k) {
+            const Vec3 p(i, j, k);
+            const Real s = 1 - (p - x).squaredNorm() / (influence * influence);
+            if (s <= 0) continue;
+            mean += s * s * s * (p - x);
+            weight += s * s * s;
+          }
+      sum += mean.norm() / weight;
+    }
+  return sum / (kSide * kSide);
+}
+
+skin::LevelSetOptions level_set_options(const SkinCommand& command, Real radius, bool match_volume) {
+  skin::LevelSetOptions options;
+  options.spacing = 2 * radius;
+  options.voxel = command.cube_size * radius;
+  options.influence = command.smoothing_length;
+  options.smoothing = command.mesh_smoothing_iters;
+  options.drop_volume = command.drop_volume;
+  options.match_volume = match_volume;
+  if (match_volume) {
+    options.radius = std::min(options.radius, options.influence - 1.05);
+    return options;
+  }
+  const Real threshold = command.surface_threshold.value_or(0.5);
+  options.radius = flat_radius(options.influence, threshold_distance(threshold) * options.influence);
+  const Real most = std::min(1.0, options.influence - 1.05);
+  if (options.radius < 0.2 || options.radius > most)
+    throw InputError(Place{}, fmt::format("--surface-threshold {} with --smoothing-length {} would round a lone particle with {:.2f} of its spacing, wanted 0.2 to {:.2f}", threshold,
+                                          command.smoothing_length, options.radius, most));
+  return options;
+}
+
+// One frame.
+
+void crop(PointCloud& cloud, const Box3& box) {
+  std::vector<std::size_t> kept;
+  for (std::size_t i = 0; i < cloud.size(); ++i)
+    if (box.contains(cloud.position[i])) kept.push_back(i);
+  const auto take = [&](auto& array) {
+    if (array.empty()) return;
+    for (std::size_t k = 0; k < kept.size(); ++k) array[k] = array[kept[k]];
+    array.resize(kept.size());
+  };
+  take(cloud.position);
+  take(cloud.radius);
+  take(cloud.velocity);
+  take(cloud.temperature);
+  take(cloud.crust);
+  take(cloud.age);
+  take(cloud.id);
+  take(cloud.rest);
+  take(cloud.rest2);
+}
+
+Real median(std::vector<Real> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// The radius that counts, and where it is from. Kept for a whole sequence, so that its frames go together.
+struct Radius {
+  Real value = 0;
+  std::string source;
+};
+
+/// y up, as the particles are, to z up, as write_glb expects.
+geometry::TriMesh turned_to_z_up(geometry::TriMesh mesh) {
+  const auto turn = [](auto& y, auto& z) {
+    const auto old_y = y;
+    y = -z;
+    z = old_y;
+  };
+  for (Vec3& x : mesh.positions) turn(x.y(), x.z());
+  for (Vec3& n : mesh.normals) turn(n.y(), n.z());
+  for (auto& [name, attribute] : mesh.attributes)
+    if (attribute.width == 3)
+      for (std::size_t i = 0; i + 2 < attribute.values.size(); i += 3) turn(attribute.values[i + 1], attribute.values[i + 2]);
+  return mesh;
+}
+
+/// What --check found.
+struct Check {
+  geometry::MeshReport report;
+  std::size_t self_intersections = 0;
+  Real volume = 0;
+  bool passed = false;
+};
+
+/// as_float: positions as formats of single precision hold them, which far from the origin is not what was made.
+Check check_mesh(geometry::TriMesh mesh, bool as_float, bool no_particles) {
+  ZONE("skin.check");
+  if (as_float)
+    for (Vec3& x : mesh.positions) x = x.cast<float>().cast<Real>();
+  Check check;
+  check.report = geometry::validate(mesh);
+  check.self_intersections = geometry::self_intersections(mesh).size();
+  check.volume = geometry::signed_volume(mesh);
+  const bool nothing = no_particles && mesh.triangles.empty();  // a frame before the first drop is as it should be
+  check.passed = nothing || (check.report.solid() && check.self_intersections == 0 && check.volume > 0);
+  return check;
+}
+
+ordered_json to_json(const Check& check) {
+  const geometry::MeshReport& r = check.report;
+  return {{"passed", check.passed},
+          {"closed", r.closed()},
+          {"manifold", r.manifold()},
+          {"oriented", r.oriented()},
+          {"self_intersections", check.self_intersections},
+          {"components", r.components},
+          {"euler", r.euler},
+          {"volume", check.volume},
+          {"boundary_edges", r.boundary_edges},
+          {"non_manifold_edges", r.non_manifold_edges},
+          {"non_manifold_vertices", r.non_manifold_vertices},
+          {"misoriented_edges", r.misoriented_edges},
+          {"degenerate_triangles", r.repeated_indices + r.zero_area}};
+}
+
+/// One line without the vertices and triangles, which stand elsewhere.
+std::string to_text(const Check& check) {
+  return fmt::format("check {}: {}, {}, encloses {:.6g}", check.passed ? "passed" : "FAILED", to_string(check.report),
+                     check.self_intersections == 0 ? "no self-intersections" : fmt::format("{} pairs of triangles intersect", check.self_intersections), check.volume);
+}
+
+class Skinner {
+ public:
+  Skinner(const SkinCommand& command, const CommonOptions& common) : command_(command), common_(common) {
+    if (command.particle_aabb_min.size() == 3) box_ = Box3(Vec3(command.particle_aabb_min.data()), Vec3(command.particle_aabb_max.data()));
+    if (box_ && box_->isEmpty()) throw InputError(Place{}, "--particle-aabb-min is not below --particle-aabb-max");
+    if (command.particle_radius > 0) radius_ = Radius{command.particle_radius, "--particle-radius"};
+  }
+
+  /// False: its check failed.
+  bool frame(std::optional<long long> number, const fs::path& file) {
+    const auto start = std::chrono::steady_clock::now();
+    const std::vector<fs::path> outputs = outputs_of(command_, number, file);
+    PointCloud cloud = importers::import_points(file, {.radius = command_.particle_radius == 0});
+    for (const std::string& note : cloud.notes) tell_once(file, note);
+    const std::size_t read = cloud.size();
+    if (box_) crop(cloud, *box_);
+    choose_radius(file, cloud);
+
+    ordered_json j;
+    if (number) j["frame"] = *number;
+    j["input"] = file.string();
+    j["particles"] = cloud.size();
+    if (box_) j["outside_box"] = read - cloud.size();
+    for (const std::string& note : cloud.notes) j["notes"].push_back(note);
+
+    const Real radius = cloud.size() > 0 ? radius_->value : 1;
+    const bool match = command_.match_volume.value_or(!command_.surface_threshold && !estimated_);
+    Real volume = 0;
+    for (const Real r : cloud.radius) volume += 8 * r * r * r;
+    skin::LevelSet surface;
+    try {
+      surface = skin::build_level_set(cloud.points(), volume, nullptr, level_set_options(command_, radius, match));
+    } catch (const InputError& error) {
+      throw named(error, file);
+    }
+    const bool meshed = command_.check || std::any_of(outputs.begin(), outputs.end(), [](const fs::path& f) { return format_of(f) != Format::kVdb; });
+    geometry::TriMesh mesh;
+    if (meshed && !surface.empty()) mesh = skin::mesh_level_set(surface);
+    if (!command_.sph_normals) geometry::compute_normals(mesh);
+    if (cloud.size() > 0) {
+      j["radius"] = radius;
+      j["radius_from"] = radius_->source;
+      j["volume"] = surface.report().volume;
+      j["particle_volume"] = volume;
+      if (match && std::abs(surface.report().residual) > 0.01)
+        tell_once(file, fmt::format("the skin encloses {:.3g} times the particles' volume: they overlap, or the radius is not half their spacing", 1 + surface.report().residual));
+    }
+    if (meshed) {
+      j["vertices"] = mesh.positions.size();
+      j["triangles"] = mesh.triangles.size();
+    }
+    const skin::LevelSetReport& report = surface.report();
+    if (report.dropped_pieces + report.filled_bubbles > 0) {
+      j["dropped_pieces"] = report.dropped_pieces;
+      j["filled_bubbles"] = report.filled_bubbles;
+    }
+    std::optional<Check> check;
+    if (command_.check) {
+      const bool as_float = std::any_of(outputs.begin(), outputs.end(), [](const fs::path& f) { return format_of(f) != Format::kObj; });
+      check = check_mesh(mesh, as_float, cloud.size() == 0);
+      j["check"] = to_json(*check);
+    }
+
+    const skin::Metadata about = {{"generator", fmt::format("effuse {}", EFFUSE_VERSION)}, {"particles", file.filename().string()}};
+    for (const fs::path& output : outputs) write(output, mesh, surface, about);
+    for (const fs::path& output : outputs) j["outputs"].push_back(output.string());
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    j["seconds"] = seconds;
+    log_info(fmt::format("{}: {} particles{} -> {}, {:.2f} s", file.string(), cloud.size(), dropped(report), meshed ? fmt::format("{} triangles", mesh.triangles.size()) : "level set", seconds));
+    if (check && !common_.json) fmt::print("{}: {}\n", outputs.front().string(), to_text(*check));
+    frames_.push_back(std::move(j));
+    return !check || check->passed;
+  }
+
+  ordered_json& frames() { return frames_; }
+
+ private:
+  /// An error of a package below, which knows no file.
+  static InputError named(const InputError& error, const fs::path& file) {
+    std::vector<Fault> faults = error.faults();
+    for (Fault& fault : faults)
+      if (fault.place.file.empty()) fault.place.file = file.string();
+    return InputError(std::move(faults));
+  }
+
+  static std::string dropped(const skin::LevelSetReport& report) {
+    if (report.dropped_pieces + report.filled_bubbles == 0) return "";
+    return fmt::format(" ({} small pieces dropped, {} bubbles filled)", report.dropped_pieces, report.filled_bubbles);
+  }
+
+  /// What a sequence says of every frame is told once.
+  void tell_once(const fs::path& file, const std::string& note) {
+    if (std::find(told_.begin(), told_.end(), note) != told_.end()) return;
+    told_.push_back(note);
+    log_info(fmt::format("{}: {}", file.string(), note));
+  }
+
+  /// Fills cloud.radius and, with the first particles of all, radius_.
+  void choose_radius(const fs::path& file, PointCloud& cloud) {
+    if (cloud.size() == 0) return;
+    const bool own = command_.particle_radius == 0 && !cloud.radius.empty();
+    if (!radius_ && own) {
+      radius_ = Radius{median(cloud.radius), "file"};
+      const auto [least, most] = std::minmax_element(cloud.radius.begin(), cloud.radius.end());
+      if (*most > 1.01 * *least)
+        tell_once(file, fmt::format("radii are from {:.6g} to {:.6g}: smoothing length and cube size are of the median, {:.6g}", *least, *most, radius_->value));
+    }
+    if (!radius_) {
+      const Real spacing = importers::estimate_spacing(cloud.position);
+      if (!(spacing > 0)) throw InputError(Place{file.string()}, "has no radii, and not two places to estimate one from: give --particle-radius");
+      estimated_ = true;
+      radius_ = Radius{spacing / 2, "estimated"};
+      log_info(fmt::format("{}: no radii; estimated as half the distance of neighbours: --particle-radius {:.6g}", file.string(), radius_->value));
+    }
+    if (!own) cloud.radius.assign(cloud.size(), radius_->value);
+  }
+
+  void write(const fs::path& file, const geometry::TriMesh& mesh, const skin::LevelSet& surface, const skin::Metadata& about) const {
+    switch (format_of(file)) {
+      case Format::kPly:
+        return skin::write_ply(file, mesh, about);
+      case Format::kObj:
+        return skin::write_obj(file, mesh, about);
+      case Format::kGlb:
+        return command_.up == "y" ? skin::write_glb(file, turned_to_z_up(mesh), about) : skin::write_glb(file, mesh, about);
+      case Format::kVdb:
+        return skin::write_vdb(file, surface, about);
+    }
+  }
+
+  const SkinCommand& command_;
+  const CommonOptions& common_;
+  std::optional<Box3> box_;
+  std::optional<Radius> radius_;
+  bool estimated_ = false;
+  std::vector<std::string> told_;
+  ordered_json frames_ = ordered_json::array();
+};
+
+}  // namespace
+
+ExitCode skin_particles(const SkinCommand& command, const CommonOptions& common) {
+  if (command.particle_aabb_min.size() != command.particle_aabb_max.size()) throw InputError(Place{}, "--particle-aabb-min and --particle-aabb-max go together");
+  if (command.surface_threshold && command.match_volume.value_or(false))
+    throw InputError(Place{}, "--surface-threshold and --match-volume on: the surface lies where the one or the other puts it");
+  if (!command.match_volume.value_or(true) || command.surface_threshold) level_set_options(command, 1, false);  // refused now, if at all
+  const Inputs inputs = find_inputs(command);
+  // Names are refused before the first frame is made.
+  if (inputs.single) outputs_of(command, std::nullopt, *inputs.single);
+  for (const auto& [number, file] : inputs.frames) outputs_of(command, number, file);
+  if (inputs.missing_count > 0)
+    log_warning(fmt::format("{} frames are missing: {}{}", inputs.missing_count, ranges(inputs.missing), inputs.missing_count > inputs.missing.size() ? ", ..." : ""));
+
+  Skinner skinner(command, common);
+  bool passed = true;
+  if (inputs.single) passed = skinner.frame(std::nullopt, *inputs.single);
+  for (const auto& [number, file] : inputs.frames) passed = skinner.frame(number, file) && passed;
+  if (common.json) {
+    ordered_json j;
+    j["ok"] = passed;
+    j["frames"] = std::move(skinner.frames());
+    if (!inputs.single) j["missing"] = inputs.missing;
+    rusage usage{};
+    ::getrusage(RUSAGE_SELF, &usage);
+    j["peak_memory_bytes"] = static_cast<std::int64_t>(usage.ru_maxrss) * 1024;
+    print_document(j.dump(1, ' ', false, ordered_json::error_handler_t::replace));
+  }
+  return passed ? ExitCode::kDone : ExitCode::kFailed;
+}
+
+}  // namespace effuse
