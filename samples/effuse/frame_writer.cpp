@@ -59,11 +59,11 @@ FrameWriter::Result FrameWriter::write_frame(const flow::Simulation& simulation)
     mesh = skin::mesh_level_set(surface);
     result.volume = surface.report().volume;
     result.particle_volume = effect->volume();
-    skin::DisplaceOptions detail = settings_.detail;
+    skin::DisplaceOptions detail = skin::detail_at(settings_, terrain_, frame / scene_.fps);
     detail.spacing = options.spacing;
     detail.seed = scene_.seed;
     detail.rest_ratio = points.rest_ratio;
-    skin::displace(mesh, &terrain_, detail);
+    skin::displace(mesh, points, &terrain_, detail);
     skin::color_lava(mesh, settings_.color);
   }
   result.triangles = mesh.triangles.size();
