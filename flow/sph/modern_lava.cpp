@@ -472,7 +472,9 @@ struct ModernLava::Impl {
     if (dt_max - dt < 1e-6 * dt) dt = dt_max;  // no crumb of a step is left over
     if (dt < dt_max && dt < o.min_step)
       throw UnstableError(fmt::format("at t = {:.6g} s speed or acceleration leave a step of {:.3g} s, less than min_step {:.3g} s ({} particles)", time, dt, o.min_step, size()));
+    wake_by_walls();
     const bool all_asleep = std::find(asleep.begin(), asleep.end(), 0) == asleep.end();
+    if (!all_asleep) catch_up_unreported();
     if (steps % kSortInterval == 0 && !all_asleep) {
       drop_what_left();
       sort_particles();
@@ -545,6 +547,27 @@ struct ModernLava::Impl {
     rested = 0;
   }
 
+  void catch_up_unreported() {
+    if (rested <= 0) return;
+    ModernReport report;
+    catch_up(report);
+    owed = report.heat;
+  }
+
+  /// Sleepers that a moving surface has come near to.
+  void wake_by_walls() {
+    if (o.ground_speed <= 0 || std::find(asleep.begin(), asleep.end(), 1) == asleep.end()) return;
+    ground.find(x, [&](std::size_t i) { return asleep[i] != 0; });
+    for (std::size_t i = 0; i < size(); ++i) {
+      if (!asleep[i]) continue;
+      ground.for_each_contact(i, x[i], [&](const geometry::Contact& c, Real) {
+        if (c.surface_velocity.isZero()) return;
+        asleep[i] = 0;
+        slow[i] = 0;
+      });
+    }
+  }
+
   /// Into the report: what no report has had.
   void settle(ModernReport& report) {
     report.heat.radiated += owed.radiated;
@@ -610,11 +633,7 @@ void ModernLava::add(std::span<const Vec3> x, std::span<const Vec3> v, std::span
   CHECK_EQ(v.size(), x.size());
   CHECK_EQ(temperature.size(), x.size());
   Impl& m = *impl_;
-  if (m.rested > 0) {
-    ModernReport caught_up;
-    m.catch_up(caught_up);
-    m.owed = caught_up.heat;
-  }
+  m.catch_up_unreported();
   for (std::size_t i = 0; i < x.size(); ++i) {
     CHECK(x[i].allFinite() && v[i].allFinite() && std::isfinite(temperature[i]));
     m.born(x[i], v[i], temperature[i]);

@@ -84,7 +84,7 @@ struct ModernReport {
 ///
 /// Sleep: a particle slower than sleep_speed for sleep_delay is left where it is: no neighbours, no pressure, no viscosity.
 /// The sleepers within reach of those awake are moved along in the solves; one that would go faster than twice
-/// sleep_speed wakes. Heat goes on (see Heat), in all; while everything sleeps and no vent is open it takes 16 max_step at
+/// sleep_speed wakes, and so does one that a moving surface comes within a support of. Heat goes on (see Heat), in all; while everything sleeps and no vent is open it takes 16 max_step at
 /// a time, and temperatures lie behind by up to that.
 ///
 /// Deterministic: the same bits on any number of threads. Not thread-safe itself.

@@ -743,6 +743,29 @@ TEST(ModernLava, ANewVentWakesWhatItTouches) {
   EXPECT_TRUE(finite(lava));
 }
 
+TEST(ModernLava, AMovingWallWakesTheSleepersItRunsInto) {
+  auto place = std::make_shared<Real>(-5);
+  auto speed = std::make_shared<Real>(0);
+  const ContactSource piston = [place, speed](std::span<const Vec3> x, Real reach, std::span<geometry::Contact> out) {
+    plane(Vec3(*place, 0, 0), Vec3::UnitX(), Vec3(*speed, 0, 0), 1)(x, reach, out);
+  };
+  ModernLava lava(sleepy(), {}, {floor_at(), piston});
+  fill(lava, lattice_block(12, 6, 3, 0.2));
+  let_sleep(lava);
+  Real left = 1e9;
+  for (const Vec3& x : lava.positions()) left = std::min(left, x.x());
+  *place = left - 0.5;
+  *speed = 0.1;
+  for (int step = 0; step < 60; ++step) {
+    lava.step(0.2);
+    *place += 0.2 * *speed;
+  }
+  EXPECT_LT(sleepers(lava), lava.size());
+  std::size_t behind = 0;
+  for (const Vec3& x : lava.positions()) behind += x.x() < *place - 0.02;
+  EXPECT_EQ(behind, 0u) << "the wall went through";
+}
+
 TEST(ModernLava, ALoadWakesSleepersAndTheyMoveAndSettleAgain) {
   ModernLava lava = cake(12);
   let_sleep(lava);
