@@ -91,7 +91,7 @@ struct ModernLava::Impl {
   Walls walls;
   FlowShape shape;
   PairKernels pairs;
-  std::vector<Vec3> lx, lv, start, predicted;
+  std::vector<Vec3> lx, lv, start, predicted, viscous_v;
   std::vector<Real> lq, lmu, rate, least, scratch, wall_distances;
   std::vector<std::uint8_t> fixed;
   ViscositySolver viscosity;
@@ -357,6 +357,7 @@ struct ModernLava::Impl {
       pressure_acceleration(s, lq, predicted);
       parallel_for(m, [&](std::size_t k) { predicted[k] = s.is_fixed(k) ? start[k] : Vec3(start[k] + dt * (predicted[k] + o.gravity)); }, 2048);
       const ViscosityResult viscous = viscosity.solve(s, o.density, lmu, o.slip_length, dt, predicted, o.viscosity_tolerance, o.max_iterations, lv, scale);
+      if (o.heat.on && o.heat.viscous_heating) viscous_v = lv;
       report.viscosity_iterations += viscous.iterations;
       report.viscosity_residual = viscous.residual;
       if (!(viscous.residual < kFailed * o.viscosity_tolerance)) return false;
@@ -434,7 +435,8 @@ struct ModernLava::Impl {
     std::vector<Real> power;
     if (o.heat.viscous_heating && !set.particles.empty()) {
       scratch.resize(set.particles.size());
-      dissipation(system(), lmu, o.slip_length, lv, scratch);
+      // Of the velocities that viscosity left: what pressure adds to these is not sheared yet, and stiff lava would boil of it.
+      dissipation(system(), lmu, o.slip_length, viscous_v, scratch);
       if (!all) {
         power.assign(size(), 0.0);
         for (std::size_t k = 0; k < set.awake; ++k) power[set.particles[k]] = scratch[k];
@@ -482,7 +484,7 @@ struct ModernLava::Impl {
 
     emitter.carry(time, dt, v);
     set.find(x, asleep, support);
-    if (all_asleep) {
+    if (set.awake == 0) {  // those awake may just have left
       rest(dt, report);
       return report;
     }
@@ -705,7 +707,7 @@ std::size_t ModernLava::memory() const {
   const auto bytes = [](const auto&... vectors) { return ((vectors.capacity() * sizeof(vectors[0])) + ...); };
   return bytes(m.x, m.v, m.q, m.mu, m.density, m.exposed, m.grounded, m.ground_T, m.slow, m.surface, m.asleep) + m.census.memory() + m.frames.memory() +
          m.ground.memory() + m.emitter.memory() + m.heat.memory() + m.grid.memory() + m.neighbors.memory() + m.pairs.memory() + m.shape.memory() + m.viscosity.memory() +
-         m.pressure.memory() + bytes(m.set.particles, m.walls.first, m.walls.walls, m.lx, m.lv, m.start, m.predicted, m.lq, m.lmu, m.rate, m.least,
+         m.pressure.memory() + bytes(m.set.particles, m.walls.first, m.walls.walls, m.lx, m.lv, m.start, m.predicted, m.viscous_v, m.lq, m.lmu, m.rate, m.least,
                                      m.scratch, m.wall_distances, m.fixed, m.before_x, m.radius, m.crust, m.age, m.p);
 }
 

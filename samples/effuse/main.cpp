@@ -5,6 +5,8 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
+#include <cstdlib>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
@@ -94,6 +96,9 @@ void add_skin_options(CLI::App* verb, effuse::SkinCommand& skin) {
   verb->add_option("--particle-aabb-min", skin.particle_aabb_min, "x y z: skin only particles in a box, this is its lower corner")->expected(3);
   verb->add_option("--particle-aabb-max", skin.particle_aabb_max, "x y z: its upper corner")->expected(3);
   verb->footer("Exit codes: 0 done, 1 a check of the mesh failed, 2 wrong use or bad input, 5 out of disk or memory.");
+  // Ranges let nan through.
+  const CLI::Validator finite([](std::string& text) { return std::isfinite(std::strtod(text.c_str(), nullptr)) ? "" : "must be a finite number"; }, "");
+  for (const char* name : {"-r", "-l", "-c", "-t", "--drop-volume", "--particle-aabb-min", "--particle-aabb-max"}) verb->get_option(name)->check(finite);
 }
 
 bool out_of_resources(const std::system_error& error) {

@@ -503,6 +503,49 @@ TEST(ModernLava, WhatLeavesOverAnEdgeIsCountedAndMassKept) {
   EXPECT_GT(lowest, -16 * 0.1 * 10) << "they go within some steps";
 }
 
+TEST(ModernLava, TheLastAwakeMayLeave) {
+  // A particle runs off a steep table, alone, and with sleepers that stay behind.
+  for (const bool with_sleepers : {false, true}) {
+    ModernOptions o = isothermal(0.2, 1000);
+    o.sleep_speed = 2e-3;
+    o.sleep_delay = 0.5;
+    o.max_step = 0.05;
+    const auto inside = [](const Vec3& p) { return p.x() < 1; };
+    const ContactSource table = [](std::span<const Vec3> x, Real reach, std::span<geometry::Contact> out) {
+      plane(Vec3::Zero(), Vec3::UnitZ())(x, reach, out);
+      for (std::size_t i = 0; i < x.size(); ++i)
+        if (x[i].x() >= 1) out[i] = {};
+    };
+    ModernLava lava(o, {}, {table}, inside);
+    if (with_sleepers) fill(lava, {Vec3(-3, 0, 0.1)}, Vec3::Zero(), Vec3::Zero(), 1400);
+    while (with_sleepers && sleepers(lava) == 0 && lava.time() < 20) lava.step(0.05);
+    fill(lava, {Vec3(0.9, 0, 1.1)}, Vec3::Zero(), Vec3(6, 0, 0), 1400);
+    const Real t = lava.time();
+    while (lava.time() < t + 8) lava.step(0.05);
+    EXPECT_EQ(lava.size(), with_sleepers ? 1u : 0u);
+  }
+}
+
+TEST(ModernLava, StiffLavaIsNotHeatedByWhatPressureLeaves) {
+  // A heap of 1e10 Pa s that falls by a millimetre frees next to nothing.
+  ModernOptions o = isothermal(0.2, 1e10);
+  o.heat.on = true;
+  o.heat.viscous_heating = true;
+  o.max_step = 0.1;
+  ModernLava lava(o, {}, {floor_at()});
+  fill(lava, lattice_block(8, 8, 5, 0.2));
+  const auto height = [&] {
+    Real sum = 0;
+    for (const Vec3& x : lava.positions()) sum += x.z() * lava.particle_mass() * kGravity;
+    return sum;
+  };
+  const Real before = height();
+  Real heated = 0;
+  while (lava.time() < 5) heated += lava.step(0.1).heat.dissipated;
+  const Real fallen = before - height(), all = static_cast<Real>(lava.size()) * lava.particle_mass() * kGravity;
+  EXPECT_LT(heated, std::max(fallen, 0.0) + 0.02 * all) << "two centimetres' fall; " << fallen << " J freed";
+}
+
 // ---- determinism, checkpoints ----
 
 /// Everything on: two vents, heat, crust, sleep, a slope.
