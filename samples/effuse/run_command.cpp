@@ -10,6 +10,7 @@
 #include <cstring>
 #include <new>
 #include <nlohmann/json.hpp>
+#include <map>
 #include <optional>
 
 #include "geometry/base/files.h"
@@ -28,6 +29,8 @@ namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
 namespace {
+
+constexpr double kUnsolvedShare = 0.05;  // of the steps: more are worth a word
 
 volatile std::sig_atomic_t g_interrupted = 0;  // a signal handler may touch nothing else
 
@@ -301,6 +304,14 @@ ExitCode run(const RunCommand& command, const CommonOptions& common) {
     std::fwrite(table.data(), 1, table.size(), stderr);
   }
 
+  for (const auto& effect : simulation.effects()) {
+    std::map<std::string, double> figures;
+    for (const auto& [name, value] : effect->figures()) figures[name] = value;
+    if (const double unsolved = figures["unsolved_steps"], steps = figures["steps"]; unsolved > kUnsolvedShare * steps)
+      log_warning(fmt::format("{}: in {:.0f} of {:.0f} steps a solve did not reach its tolerance (run.json: largest_divergence_error, "
+                              "largest_viscosity_residual); a shorter max_step or more max_iterations would help",
+                              effect->name(), unsolved, steps));
+  }
   if (code == ExitCode::kInterrupted) log_warning("interrupted; this goes on: " + resume_line(command, folder));
   if (code == ExitCode::kUnstable) {
     log_warning(fmt::format("stopped in frame {}; the last good state is {}", simulation.frame() + 1, flow::checkpoints(folder).front().string()));
