@@ -348,7 +348,7 @@ struct ModernLava::Impl {
     lv = start;
     parallel_for(m, [&](std::size_t k) {
       lq[k] = std::max(q[set.particles[k]], 0.0);
-      rate[k] = std::max(1 - shape.density[k], 0.0) * kFillUp / dt;
+      rate[k] = k < set.awake ? std::max(1 - shape.density[k], 0.0) * kFillUp / dt : 0;  // a sleeper keeps its gaps
     }, 2048);
     report.pressure_iterations = report.viscosity_iterations = report.density_iterations = 0;
     const Real g = o.gravity.norm(), scale = g > 0 ? dt * g : std::numeric_limits<Real>::infinity();
@@ -374,8 +374,8 @@ struct ModernLava::Impl {
       parallel_for(m, [&](std::size_t k) {
         const Real excess = shape.density[k] - 1;
         rate[k] = excess > 0 ? -kTakeBack * excess : -0.5 * excess;
-        // What stands still asks for no room: a neighbour barely in reach would have to go far to give it.
-        if (s.is_fixed(k)) rate[k] = std::max(rate[k], 0.0);
+        // What stands still or sleeps asks for no room: a neighbour barely in reach would have to go far to give it.
+        if (s.is_fixed(k) || k >= set.awake) rate[k] = std::max(rate[k], 0.0);
       }, 2048);
       // A share is taken back each step: it need not be exact.
       const Real enough = std::max(o.density_tolerance, kEnough * kTakeBack * report.density_error);

@@ -180,25 +180,33 @@ CaseResult cold_night() {
   const flow::Effect& lava = *simulation.effects().front();
   constexpr double kSecondVent = 41000;
   constexpr int kLastFrames = 10;  // before the second vent: the night's end
+  constexpr std::size_t kAtPeak = 10;  // steps
+  using Clock = std::chrono::steady_clock;
 
   Curve awake{"awake", {}, {}, false, false}, all{"all", {}, {}, false, true};
   Curve cost{"a step", {}, {}, false, false};
   std::map<std::string, double> f;
-  double steps = 0, peak = 0, old = 0, asleep_from = -1, woken = 0;
+  double peak = 0, old = 0, asleep_from = -1, woken = 0;
   std::vector<double> costs;  // of a step, by frame, until the second vent
   double awake_before = 0;
   while (simulation.frame() < loaded->scene.frames) {
-    const auto start = std::chrono::steady_clock::now();
-    simulation.advance([] { return true; });
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    std::vector<Clock::time_point> ticks;  // begins of steps, and the last one's end
+    const auto tick = [&] { ticks.push_back(Clock::now()); };
+    simulation.advance([&] {
+      tick();
+      return true;
+    });
+    tick();
+    const auto mean_step = [&](std::size_t from, std::size_t to) {
+      return std::chrono::duration<double>(ticks[to] - ticks[from]).count() / static_cast<double>(to - from);
+    };
     for (const auto& [name, value] : lava.figures()) f[name] = value;
-    const double a_step = seconds / (f["steps"] - steps), t = simulation.time();
-    steps = f["steps"];
+    const double a_step = mean_step(0, ticks.size() - 1), t = simulation.time();
     for (Curve* c : {&awake, &all, &cost}) c->x.push_back(t / 3600);
     awake.y.push_back(f["awake"]), all.y.push_back(f["particles"]), cost.y.push_back(1e3 * a_step);
     if (t < kSecondVent) {
       costs.push_back(a_step);
-      peak = std::max(peak, a_step);
+      for (std::size_t k = kAtPeak; k < ticks.size(); ++k) peak = std::max(peak, mean_step(k - kAtPeak, k));
       old = f["particles"];
       awake_before = f["awake"];
       if (f["awake"] > 0) asleep_from = -1;
