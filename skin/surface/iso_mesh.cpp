@@ -1,13 +1,13 @@
 #include "skin/surface/iso_mesh.h"
 
-#include <openvdb/openvdb.h>
-#include <openvdb/tools/VolumeToMesh.h>
-
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
+#include "geometry/base/check.h"
 #include "geometry/base/parallel.h"
 #include "geometry/base/zones.h"
+#include "skin/surface/dual_cells.h"
 
 namespace effuse::skin {
 
@@ -17,71 +17,256 @@ namespace {
 /// all the cells around it into triangles of no area.
 constexpr float kLeast = 1.0f / 64;
 
-openvdb::FloatGrid::Ptr to_grid(const Blocks& blocks, float outside, const Field& phi) {
-  auto grid = openvdb::FloatGrid::create(outside);
-  grid->setGridClass(openvdb::GRID_LEVEL_SET);
-  using Leaf = openvdb::FloatTree::LeafNodeType;
-  static_assert(Leaf::SIZE == kVoxels && Leaf::DIM == kSide);
-  std::vector<Leaf*> leaves(blocks.size(), nullptr);
-  std::vector<std::uint8_t> deep(blocks.size(), 0);
-  parallel_for(
-      blocks.size(),
-      [&](std::size_t b) {
-        const float* values = &phi[b * kVoxels];
-        // The blocks beside one that the surface crosses must be there too, down to the last voxel.
-        const auto sided = [&](Index other) {
-          if (other == kNone) return 1;
-          const float* v = &phi[other * kVoxels];
-          const auto [low, high] = std::minmax_element(v, v + kVoxels);
-          return *high < 0 ? -1 : *low >= 0 ? 1 : 0;
+float off_zero(float v) { return std::abs(v) >= kLeast ? v : v < 0 ? -kLeast : kLeast; }
+
+/// Values from voxel -1 to 9 of a block, z fastest.
+struct Padded {
+  static constexpr int kWide = 11, kX = kWide * kWide, kY = kWide;
+  std::array<float, kWide * kWide * kWide> value;
+
+  static std::size_t at(int i, int j, int k) { return static_cast<std::size_t>((i + 1) * kX + (j + 1) * kY + k + 1); }
+  const float& operator()(int i, int j, int k) const { return value[at(i, j, k)]; }
+
+  Padded(const Blocks& blocks, float outside, const Field& phi, std::size_t b) {
+    const std::array<Index, 27>& around = blocks.around(b);
+    for (int i = -1; i < kWide - 1; ++i)
+      for (int j = -1; j < kWide - 1; ++j) {
+        const auto part = [&](int dz) {
+          const Index block = around[static_cast<std::size_t>(((i >> 3) + 1) * 9 + ((j >> 3) + 1) * 3 + dz)];
+          return block == kNone ? nullptr : &phi[block * kVoxels + voxel_index(i & 7, j & 7, 0)];
         };
-        int sum = 0;
-        for (const Index other : blocks.around(b)) sum += sided(other);
-        if (sum == 27) return;
-        deep[b] = sum == -27;
-        if (deep[b]) return;
-        const BlockCoord& c = blocks.coords()[b];
-        auto* leaf = new Leaf(openvdb::Coord(kSide * c[0], kSide * c[1], kSide * c[2]), outside, false);
-        for (std::size_t v = 0; v < kVoxels; ++v) {
-          const float value = values[v];
-          leaf->setValueOn(static_cast<openvdb::Index>(v), std::abs(value) >= kLeast ? value : value < 0 ? -kLeast : kLeast);
+        float* row = &value[at(i, j, -1)];
+        std::fill_n(row, kWide, outside);
+        if (const float* p = part(0)) row[0] = off_zero(p[7]);
+        if (const float* p = part(1))
+          for (int k = 0; k < kSide; ++k) row[k + 1] = off_zero(p[k]);
+        if (const float* p = part(2)) {
+          row[9] = off_zero(p[0]);
+          row[10] = off_zero(p[1]);
         }
-        leaves[b] = leaf;
-      },
-      16);
+      }
+  }
+
+  /// Of the cell at (i, j, k), -1 .. 8.
+  unsigned configuration(int i, int j, int k) const {
+    const float* c = &value[at(i, j, k)];
+    const float corner[8] = {c[0], c[1], c[kY], c[kY + 1], c[kX], c[kX + 1], c[kX + kY], c[kX + kY + 1]};
+    unsigned bits = 0;
+    for (unsigned n = 0; n < 8; ++n) bits |= (corner[n] < 0 ? 1u : 0u) << n;
+    return bits;
+  }
+};
+
+/// The faces of a cell that have to be joined: pinched on both sides.
+unsigned joined_faces(const Padded& p, int i, int j, int k, unsigned configuration) {
+  unsigned joined = 0;
+  const unsigned pinched = kDualCells[configuration].pinched;
+  for (unsigned face = 0; face < 6; ++face) {
+    if (((pinched >> face) & 1u) == 0) continue;
+    const int step = face % 2 == 1 ? 1 : -1, axis = static_cast<int>(face / 2);
+    const unsigned other = p.configuration(i + (axis == 0 ? step : 0), j + (axis == 1 ? step : 0), k + (axis == 2 ? step : 0));
+    if ((kDualCells[other].pinched >> (face ^ 1u)) & 1u) joined |= 1u << face;
+  }
+  return joined;
+}
+
+/// Central differences at the voxels of a cell, trilinear between, at x within it.
+Eigen::Vector3f smooth_gradient(const Padded& p, int i, int j, int k, const Eigen::Vector3f& x) {
+  Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+  for (int corner = 0; corner < 8; ++corner) {
+    const int di = corner >> 2, dj = (corner >> 1) & 1, dk = corner & 1;
+    const float weight = (di ? x[0] : 1 - x[0]) * (dj ? x[1] : 1 - x[1]) * (dk ? x[2] : 1 - x[2]);
+    const float* c = &p.value[Padded::at(i + di, j + dj, k + dk)];
+    sum += weight * Eigen::Vector3f(c[Padded::kX] - c[-Padded::kX], c[Padded::kY] - c[-Padded::kY], c[1] - c[-1]);
+  }
+  return sum / 2;
+}
+
+/// Vertices of a block's cells, quads left out.
+void mesh_cells(const Padded& p, MeshedBlock& out) {
+  for (int i = 0; i < kSide; ++i)
+    for (int j = 0; j < kSide; ++j)
+      for (int k = 0; k < kSide; ++k) {
+        const unsigned configuration = p.configuration(i, j, k);
+        if (configuration == 0 || configuration == 255) continue;
+        if (out.empty()) {
+          out.configuration.assign(kVoxels, 0);
+          out.joined.assign(kVoxels, 0);
+          out.first.assign(kVoxels, 0);
+        }
+        const std::size_t cell = voxel_index(i, j, k);
+        const unsigned joined = joined_faces(p, i, j, k, configuration);
+        out.configuration[cell] = static_cast<std::uint8_t>(configuration);
+        out.joined[cell] = static_cast<std::uint8_t>(joined);
+        out.first[cell] = static_cast<std::uint16_t>(out.position.size());
+        const DualCell dual = joined == 0 ? kDualCells[configuration] : dual_cell(configuration, joined);
+
+        constexpr int kStep[3] = {Padded::kX, Padded::kY, 1};
+        const float* c = &p.value[Padded::at(i, j, k)];
+        Eigen::Vector3f middle[4], outward[4];
+        int crossings[4] = {0, 0, 0, 0};
+        for (unsigned patch = 0; patch < dual.patches; ++patch) middle[patch] = outward[patch] = Eigen::Vector3f::Zero();
+        for (std::size_t e = 0; e < 12; ++e) {
+          const std::uint8_t patch = dual.patch[e];
+          if (patch == DualCell::kNoPatch) continue;
+          const int axis = static_cast<int>(e / 4), low = detail::kCellEdges[e].low;
+          Eigen::Vector3f x(static_cast<float>(low >> 2), static_cast<float>((low >> 1) & 1), static_cast<float>(low & 1));
+          const float* from = c + (low >> 2) * Padded::kX + ((low >> 1) & 1) * Padded::kY + (low & 1);
+          const float a = from[0], b = from[kStep[axis]];
+          x[axis] = a / (a - b);
+          middle[patch] += x;
+          outward[patch][axis] += a < 0 ? 1.0f : -1.0f;
+          ++crossings[patch];
+        }
+        for (unsigned patch = 0; patch < dual.patches; ++patch) {
+          const Eigen::Vector3f x = middle[patch] / static_cast<float>(crossings[patch]), &way = outward[patch];
+          Eigen::Vector3f normal = smooth_gradient(p, i, j, k, x);
+          constexpr float kAgree = 0.3f;
+          if (!(normal.dot(way) > kAgree * normal.norm() * way.norm())) normal = way;
+          out.position.push_back(Eigen::Vector3f(static_cast<float>(i), static_cast<float>(j), static_cast<float>(k)) + x);
+          out.normal.push_back(normal.normalized());
+        }
+      }
+}
+
+/// Quads round the crossed edges that begin at the block's voxels.
+void mesh_edges(const Blocks& blocks, std::size_t b, std::vector<MeshedBlock>& meshed) {
+  MeshedBlock& out = meshed[b];
+  const std::array<Index, 27>& around = blocks.around(b);
+  // The vertex of cell (i, j, k), -1 .. 7, on its edge e.
+  const auto corner = [&](int i, int j, int k, unsigned e) {
+    const std::size_t slot = static_cast<std::size_t>(((i >> 3) + 1) * 9 + ((j >> 3) + 1) * 3 + (k >> 3) + 1);
+    const MeshedBlock& of = meshed[around[slot]];
+    const std::size_t cell = voxel_index(i & 7, j & 7, k & 7);
+    const unsigned configuration = of.configuration[cell], joined = of.joined[cell];
+    const std::uint8_t patch = joined == 0 ? kDualCells[configuration].patch[e] : dual_cell(configuration, joined).patch[e];
+    return MeshedBlock::Corner{static_cast<std::uint8_t>(slot), static_cast<std::uint16_t>(of.first[cell] + patch)};
+  };
+  for (int i = 0; i < kSide; ++i)
+    for (int j = 0; j < kSide; ++j)
+      for (int k = 0; k < kSide; ++k) {
+        const unsigned configuration = out.configuration[voxel_index(i, j, k)];
+        if (configuration == 0 || configuration == 255) continue;
+        const bool inside = configuration & 1u;
+        const auto quad = [&](const MeshedBlock::Corner& a, const MeshedBlock::Corner& c1, const MeshedBlock::Corner& c, const MeshedBlock::Corner& c3) {
+          if (inside) out.quads.push_back({a, c1, c, c3});
+          else out.quads.push_back({a, c3, c, c1});
+        };
+        // Counter-clockwise about the axis; the cell's own offsets from the edge say which of its four it is.
+        if (inside != ((configuration >> 4) & 1u))
+          quad(corner(i, j - 1, k - 1, 3), corner(i, j, k - 1, 1), corner(i, j, k, 0), corner(i, j - 1, k, 2));
+        if (inside != ((configuration >> 2) & 1u))
+          quad(corner(i - 1, j, k - 1, 7), corner(i - 1, j, k, 6), corner(i, j, k, 4), corner(i, j, k - 1, 5));
+        if (inside != ((configuration >> 1) & 1u))
+          quad(corner(i - 1, j - 1, k, 11), corner(i, j - 1, k, 9), corner(i, j, k, 8), corner(i - 1, j, k, 10));
+      }
+}
+
+/// Whether the surface crosses a cell of the block: its voxels and those one beyond them.
+bool is_crossed(const Blocks& blocks, std::size_t b, const std::vector<std::int8_t>& side) {
+  int lowest = 1, highest = -1;
+  for (const std::size_t slot : {13u, 14u, 16u, 17u, 22u, 23u, 25u, 26u}) {
+    const Index other = blocks.around(b)[slot];
+    const int s = other == kNone ? 1 : side[other];
+    lowest = std::min(lowest, s);
+    highest = std::max(highest, s);
+  }
+  return lowest != highest || lowest == 0;
+}
+
+/// Blocks with those added that the surface reaches into from a block's rim, full of `outside`; nothing to add: no value.
+bool widen(const Blocks& blocks, float outside, const Field& phi, const std::vector<std::int8_t>& side, Blocks& wider, Field& values) {
+  std::vector<BlockCoord> coords;
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    if (side[b] > 0) continue;
+    for (std::size_t slot = 0; slot < 27; ++slot) {
+      if (blocks.around(b)[slot] != kNone) continue;
+      const int d[3] = {static_cast<int>(slot / 9) - 1, static_cast<int>(slot / 3 % 3) - 1, static_cast<int>(slot % 3) - 1};
+      bool touches = false;
+      for (std::size_t v = 0; v < kVoxels && !touches; ++v) {
+        const int x[3] = {static_cast<int>(v >> 6), static_cast<int>((v >> 3) & 7), static_cast<int>(v & 7)};
+        touches = phi[b * kVoxels + v] < 0;
+        for (int a = 0; a < 3; ++a) touches = touches && (d[a] == 0 || x[a] == (d[a] < 0 ? 0 : kSide - 1));
+      }
+      const BlockCoord& c = blocks.coords()[b];
+      if (touches) coords.push_back({c[0] + d[0], c[1] + d[1], c[2] + d[2]});
+    }
+  }
+  if (coords.empty()) return false;
+  std::sort(coords.begin(), coords.end());
+  coords.erase(std::unique(coords.begin(), coords.end()), coords.end());
+  coords.insert(coords.end(), blocks.coords().begin(), blocks.coords().end());
+  wider = Blocks(std::move(coords));
+  values.assign(wider.size() * kVoxels, outside);
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     const BlockCoord& c = blocks.coords()[b];
-    if (leaves[b]) grid->tree().addLeaf(leaves[b]);
-    if (deep[b]) grid->tree().addTile(1, openvdb::Coord(kSide * c[0], kSide * c[1], kSide * c[2]), -outside, false);
+    const Index to = wider.block_at(Vec3(kSide * c[0], kSide * c[1], kSide * c[2]));
+    std::memcpy(&values[to * kVoxels], &phi[b * kVoxels], kVoxels * sizeof(float));
   }
-  return grid;
+  return true;
 }
 
 }  // namespace
 
 geometry::TriMesh iso_mesh(const Blocks& blocks, float outside, const Field& phi) {
   ZONE("skin.iso_mesh");
-  geometry::TriMesh mesh;
-  if (blocks.size() == 0) return mesh;
-  const auto grid = to_grid(blocks, outside, phi);
-  std::vector<openvdb::Vec3s> points;
-  std::vector<openvdb::Vec3I> triangles;
-  std::vector<openvdb::Vec4I> quads;
-  openvdb::tools::volumeToMesh(*grid, points, triangles, quads, 0.0, 0.0);
+  CHECK_GE(outside, 0.0f);
+  CHECK_EQ(phi.size(), blocks.size() * kVoxels);
+  // -1: all of the block's voxels are inside, 1: outside.
+  std::vector<std::int8_t> side(blocks.size());
+  parallel_for(
+      blocks.size(),
+      [&](std::size_t b) {
+        const float* v = &phi[b * kVoxels];
+        int inside = 0;
+        for (std::size_t k = 0; k < kVoxels; ++k) inside += off_zero(v[k]) < 0;
+        side[b] = inside == 0 ? 1 : inside == static_cast<int>(kVoxels) ? -1 : 0;
+      },
+      64);
+  Blocks wider;
+  Field values;
+  if (widen(blocks, outside, phi, side, wider, values)) return iso_mesh(wider, outside, values);
 
-  mesh.positions.resize(points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) mesh.positions[i] = Vec3(points[i].x(), points[i].y(), points[i].z());
-  mesh.triangles.resize(triangles.size() + 2 * quads.size());
-  for (std::size_t i = 0; i < triangles.size(); ++i) mesh.triangles[i] = {triangles[i][0], triangles[i][2], triangles[i][1]};
-  parallel_for(quads.size(), [&](std::size_t i) {
-    // OpenVDB runs clockwise from outside.
-    const Index a = quads[i][0], b = quads[i][3], c = quads[i][2], d = quads[i][1];
-    const auto& p = mesh.positions;
-    const bool along_ac = (p[a] - p[c]).squaredNorm() <= (p[b] - p[d]).squaredNorm();
-    geometry::Triangle* out = &mesh.triangles[triangles.size() + 2 * i];
-    out[0] = along_ac ? geometry::Triangle{a, b, c} : geometry::Triangle{a, b, d};
-    out[1] = along_ac ? geometry::Triangle{a, c, d} : geometry::Triangle{b, c, d};
-  });
+  std::vector<MeshedBlock> meshed(blocks.size());
+  parallel_for(
+      blocks.size(), [&](std::size_t b) { if (is_crossed(blocks, b, side)) mesh_cells(Padded(blocks, outside, phi, b), meshed[b]); }, 16);
+  parallel_for(
+      blocks.size(), [&](std::size_t b) { if (!meshed[b].empty()) mesh_edges(blocks, b, meshed); }, 16);
+
+  std::vector<Index> vertices(blocks.size() + 1, 0), quads(blocks.size() + 1, 0);
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    vertices[b + 1] = vertices[b] + static_cast<Index>(meshed[b].position.size());
+    quads[b + 1] = quads[b] + static_cast<Index>(meshed[b].quads.size());
+  }
+  geometry::TriMesh mesh;
+  mesh.positions.resize(vertices.back());
+  mesh.normals.resize(vertices.back());
+  mesh.triangles.resize(2 * static_cast<std::size_t>(quads.back()));
+  parallel_for(
+      blocks.size(),
+      [&](std::size_t b) {
+        const BlockCoord& c = blocks.coords()[b];
+        const Vec3 low(kSide * c[0], kSide * c[1], kSide * c[2]);
+        for (std::size_t v = 0; v < meshed[b].position.size(); ++v) {
+          mesh.positions[vertices[b] + v] = low + meshed[b].position[v].cast<Real>();
+          mesh.normals[vertices[b] + v] = meshed[b].normal[v].cast<Real>().normalized();
+        }
+      },
+      64);
+  parallel_for(
+      blocks.size(),
+      [&](std::size_t b) {
+        geometry::Triangle* out = mesh.triangles.data() + 2 * static_cast<std::size_t>(quads[b]);
+        for (const std::array<MeshedBlock::Corner, 4>& quad : meshed[b].quads) {
+          Index q[4];
+          for (std::size_t k = 0; k < 4; ++k) q[k] = vertices[blocks.around(b)[quad[k].block]] + quad[k].vertex;
+          const auto& p = mesh.positions;
+          const bool along = (p[q[0]] - p[q[2]]).squaredNorm() <= (p[q[1]] - p[q[3]]).squaredNorm();
+          *out++ = along ? geometry::Triangle{q[0], q[1], q[2]} : geometry::Triangle{q[0], q[1], q[3]};
+          *out++ = along ? geometry::Triangle{q[0], q[2], q[3]} : geometry::Triangle{q[1], q[2], q[3]};
+        }
+      },
+      64);
   return mesh;
 }
 

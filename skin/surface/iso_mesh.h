@@ -1,14 +1,39 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
+#include <vector>
+
 #include "geometry/mesh/tri_mesh.h"
 #include "skin/surface/blocks.h"
 
 namespace effuse::skin {
 
-/// The zero level of phi as triangles, by OpenVDB's volumeToMesh (dual: a vertex in each cell that the surface crosses),
-/// winding counter-clockwise from outside, quads split along the shorter diagonal. Closed and oriented; sheets may
-/// touch in edges and vertices (manifold.h parts them). Positions in voxels from the origin. Vertices in an order that
-/// does not depend on threads.
+/// What the cells of one block give to the mesh; cell (i, j, k) has voxel (i, j, k) at its low corner. A function of the values of
+/// the block and of those around it alone.
+struct MeshedBlock {
+  std::vector<std::uint8_t> configuration, joined;  // of each cell (dual_cells.h)
+  std::vector<std::uint16_t> first;                 // vertex of each cell's first patch
+  std::vector<Eigen::Vector3f> position, normal;    // of the vertices, from the block's voxel (0, 0, 0)
+  /// A vertex of a block nearby: 0..26 as Blocks::around, and which there.
+  struct Corner {
+    std::uint8_t block;
+    std::uint16_t vertex;
+  };
+  std::vector<std::array<Corner, 4>> quads;  // counter-clockwise from outside
+  bool empty() const { return position.empty(); }
+};
+
+/// The zero level of phi as triangles with normals: dual, with one vertex for each patch of the surface in each cell that it crosses,
+/// in the middle of the patch's crossings, and two triangles for each crossed edge, split along the shorter diagonal. Counter-
+/// clockwise from outside. Closed, oriented and manifold for every phi: patches that share a cell have vertices of their own,
+/// and faces on which two sheets would share an edge are turned to part them.
+///
+/// Normals: central differences of phi, trilinear between voxels; where those point against the crossings (places thinner than
+/// two voxels), the cell's own gradient.
+///   outside  value where there are no blocks, >= 0 (checked)
+/// Positions in voxels from the origin. Same bits on any number of threads. 60 ns a triangle and thread.
+/// Source: Nielson 2004, Dual marching cubes; Wenger 2013, Isosurfaces, ch. 5 (the faces).
 geometry::TriMesh iso_mesh(const Blocks& blocks, float outside, const Field& phi);
 
 }  // namespace effuse::skin

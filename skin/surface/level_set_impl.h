@@ -47,7 +47,9 @@ void smooth(const Blocks& blocks, float outside, float time, const Field& weight
 /// Volume [voxels] where phi < shift and above ground, phi linear in six tetrahedra a cell: what a mesh through the
 /// same crossings encloses. above: GroundField::above, or empty.
 Real enclosed(const Blocks& blocks, float outside, const Field& phi, const Field& above, float shift);
-/// The shift within +-most at which enclosed() is the target to 1e-4 of it; the nearer end when there is none.
+/// The shift within +-most, in steps of 1 / kShiftSteps, at which enclosed() is the target as nearly as such steps allow; the nearer
+/// end when there is none.
+inline constexpr int kShiftSteps = 128;
 float matching_shift(const Blocks& blocks, float outside, const Field& phi, const Field& above, Real target, float most);
 
 /// Turns inner voxels into outer ones where a face-connected set of them holds no particle (webs between particles) or is

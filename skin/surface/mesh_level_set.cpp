@@ -1,28 +1,13 @@
 #include <algorithm>
-#include <cmath>
 
 #include "geometry/base/parallel.h"
 #include "geometry/base/zones.h"
-#include "geometry/mesh/measure.h"
 #include "skin/surface/iso_mesh.h"
 #include "skin/surface/level_set_impl.h"
-#include "skin/surface/manifold.h"
 
 namespace effuse::skin {
 
 namespace {
-
-/// From the field's gradient; where it and the triangles disagree (edges of the cut, places thinner than a voxel), the
-/// triangles' angle-weighted normal.
-void gradient_normals(const LevelSet::Impl& s, const std::vector<Vec3>& at, geometry::TriMesh& mesh) {
-  ZONE("skin.normals");
-  geometry::compute_normals(mesh);
-  parallel_for(mesh.positions.size(), [&](std::size_t i) {
-    const Vec3 gradient = s.blocks.gradient(s.phi, s.outside, s.blocks.block_at(at[i]), at[i]);
-    const Real length = gradient.norm();
-    if (length > 1e-3 && gradient.dot(mesh.normals[i]) > 0.7 * length) mesh.normals[i] = gradient / length;
-  });
-}
 
 void carry_attributes(const LevelSet::Impl& s, const std::vector<Vec3>& at, geometry::TriMesh& mesh) {
   const ParticleGrid::Carried& carried = s.particles.carried();
@@ -51,10 +36,8 @@ geometry::TriMesh mesh_level_set(const LevelSet& surface) {
   ZONE("skin.mesh");
   const LevelSet::Impl& s = surface.impl();
   geometry::TriMesh mesh = iso_mesh(s.blocks, s.outside, s.phi);
-  make_manifold(mesh);
   const std::vector<Vec3> at = mesh.positions;
   for (Vec3& p : mesh.positions) p = s.world(p);
-  gradient_normals(s, at, mesh);
   carry_attributes(s, at, mesh);
   return mesh;
 }

@@ -1,6 +1,10 @@
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
+#include <numeric>
 
+#include "geometry/base/parallel.h"
 #include "geometry/base/zones.h"
 #include "skin/surface/level_set_impl.h"
 
@@ -8,84 +12,183 @@ namespace effuse::skin {
 
 namespace {
 
-/// Face-connected sets of voxels on one side of the surface.
-struct Piece {
-  std::size_t begin, end;  // its voxels in Pieces::voxels
-  bool inside;
-  bool open;     // outside, and reaches the rim of the blocks: the air
-  Real volume;   // [voxels], with a soft edge, the field's slope taken as one
-  bool settled;  // holds a particle
+/// Sets joined under the smallest of their numbers.
+struct DisjointSets {
+  std::vector<Index> parent;
+  explicit DisjointSets(std::size_t n) : parent(n) { std::iota(parent.begin(), parent.end(), Index{0}); }
+  Index root(Index a) {
+    while (parent[a] != a) a = parent[a] = parent[parent[a]];
+    return a;
+  }
+  void join(Index a, Index b) {
+    a = root(a), b = root(b);
+    if (a != b) parent[std::max(a, b)] = std::min(a, b);
+  }
 };
 
-struct Pieces {
-  std::vector<std::size_t> voxels;
-  std::vector<Index> of;  // the piece of each voxel; kNone: not looked at
-  std::vector<Piece> pieces;
+/// The face-connected sets of voxels on one side of the surface, within one block.
+struct BlockPieces {
+  std::vector<std::uint16_t> of;     // of each voxel; empty: the block is one set
+  std::vector<std::uint8_t> inside;  // of each set
+  std::vector<std::array<Index, 2>> meeting;  // sets that meet those of the next block along an axis, in all blocks' numbers
+  std::uint16_t at(std::size_t voxel) const { return of.empty() ? std::uint16_t{0} : of[voxel]; }
 };
 
-/// Every piece inside, and outside too when asked for.
-Pieces find_pieces(const Blocks& blocks, const Field& phi, bool outside_too) {
-  constexpr int kStep[6][3] = {{-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}, {0, 0, -1}, {0, 0, 1}};
-  Pieces found;
-  found.of.assign(phi.size(), kNone);
-  for (std::size_t start = 0; start < phi.size(); ++start) {
-    const bool inside = phi[start] < 0;
-    if (found.of[start] != kNone || (!inside && !outside_too)) continue;
-    const Index name = static_cast<Index>(found.pieces.size());
-    Piece piece{found.voxels.size(), 0, inside, false, 0, false};
-    found.voxels.push_back(start);
-    found.of[start] = name;
-    for (std::size_t next = piece.begin; next < found.voxels.size(); ++next) {
-      const std::size_t at = found.voxels[next], b = at / kVoxels, v = at % kVoxels;
-      piece.volume += std::min(0.5 + static_cast<Real>(std::abs(phi[at])), 1.0);
-      const int p[3] = {static_cast<int>(v >> 6), static_cast<int>((v >> 3) & 7), static_cast<int>(v & 7)};
-      for (const auto& d : kStep) {
-        const int q[3] = {p[0] + d[0], p[1] + d[1], p[2] + d[2]};
-        const Index block = blocks.around(b)[static_cast<std::size_t>(((q[0] >> 3) + 1) * 9 + ((q[1] >> 3) + 1) * 3 + (q[2] >> 3) + 1)];
-        if (block == kNone) {
-          piece.open = piece.open || !inside;
-          continue;
+/// Row by row along z: runs of voxels on one side, joined with those beside them in the two rows before.
+BlockPieces pieces_of(const float* phi) {
+  constexpr std::size_t kRows = kSide * kSide;
+  BlockPieces found;
+  std::array<std::uint8_t, kRows> row;  // bit k: voxel k is inside
+  std::uint8_t any = 0, all = 255;
+  for (std::size_t r = 0; r < kRows; ++r) {
+    unsigned bits = 0;
+    for (std::size_t k = 0; k < kSide; ++k) bits |= (phi[r * kSide + k] < 0 ? 1u : 0u) << k;
+    row[r] = static_cast<std::uint8_t>(bits);
+    any |= row[r];
+    all &= row[r];
+  }
+  if (any == 0 || all == 255) {
+    found.inside.push_back(all == 255);
+    return found;
+  }
+  struct Run {
+    std::uint8_t end;  // of its voxels in the row; it begins where the one before ended
+    std::uint8_t inside;
+    std::uint16_t parent;
+  };
+  std::array<Run, kVoxels> run;
+  std::array<std::uint16_t, kRows + 1> begin;  // of each row's runs
+  const auto root = [&](std::uint16_t a) {
+    while (run[a].parent != a) a = run[a].parent = run[run[a].parent].parent;
+    return a;
+  };
+  std::uint16_t runs = 0;
+  for (std::size_t r = 0; r < kRows; ++r) {
+    begin[r] = runs;
+    for (unsigned k = 0; k < kSide; ++runs) {
+      const unsigned side = (row[r] >> k) & 1u, other = (side ? ~unsigned{row[r]} : unsigned{row[r]} | 256u) >> k;
+      k = std::min<unsigned>(kSide, k + static_cast<unsigned>(std::countr_zero(other)));
+      run[runs] = {static_cast<std::uint8_t>(k), static_cast<std::uint8_t>(side), runs};
+    }
+    begin[r + 1] = runs;
+    for (const std::size_t step : {std::size_t{1}, std::size_t{kSide}}) {
+      if (step == 1 ? r % kSide == 0 : r < kSide) continue;
+      std::uint16_t a = begin[r], c = begin[r - step];
+      while (a < begin[r + 1] && c < begin[r - step + 1]) {
+        if (run[a].inside == run[c].inside) {
+          const std::uint16_t ra = root(a), rc = root(c);
+          run[std::max(ra, rc)].parent = std::min(ra, rc);
         }
-        const std::size_t to = block * kVoxels + voxel_index(q[0] & 7, q[1] & 7, q[2] & 7);
-        if (found.of[to] != kNone || (phi[to] < 0) != inside) continue;
-        found.of[to] = name;
-        found.voxels.push_back(to);
+        const std::uint8_t ends_a = run[a].end, ends_c = run[c].end;
+        if (ends_a <= ends_c) ++a;
+        if (ends_c <= ends_a) ++c;
       }
     }
-    piece.end = found.voxels.size();
-    found.pieces.push_back(piece);
   }
-  return found;
-}
-
-/// Marks the pieces with a voxel at a corner of a particle's cell.
-void settle(const Blocks& blocks, const ParticleGrid& particles, Pieces& found) {
-  for (const Vec3& x : particles.x())
-    for (int corner = 0; corner < 8; ++corner) {
-      const Vec3 p = x.array().floor().matrix() + Vec3(corner & 1, (corner >> 1) & 1, corner >> 2);
-      const Index b = blocks.block_at(p);
-      if (b == kNone) continue;
-      const auto in = [&](int axis) { return static_cast<int>(p[axis]) & 7; };
-      const Index piece = found.of[b * kVoxels + voxel_index(in(0), in(1), in(2))];
-      if (piece != kNone) found.pieces[piece].settled = true;
+  std::array<std::uint16_t, kVoxels> name;
+  found.of.resize(kVoxels);
+  for (std::size_t r = 0; r < kRows; ++r)
+    for (std::uint16_t a = begin[r]; a < begin[r + 1]; ++a) {
+      const std::uint16_t first = root(a);
+      if (first == a) {
+        name[a] = static_cast<std::uint16_t>(found.inside.size());
+        found.inside.push_back(run[a].inside);
+      } else {
+        name[a] = name[first];
+      }
+      for (std::size_t k = a == begin[r] ? 0 : run[a - 1u].end; k < run[a].end; ++k) found.of[r * kSide + k] = name[a];
     }
+  return found;
 }
 
 }  // namespace
 
 void drop_pieces(const Blocks& blocks, const ParticleGrid& particles, Real least, Field& phi, LevelSetReport& report) {
   ZONE("skin.pieces");
-  Pieces found = find_pieces(blocks, phi, least > 0);
-  settle(blocks, particles, found);
-  for (const Piece& piece : found.pieces) {
-    const bool webs = piece.inside && !piece.settled, small = piece.volume < least && !piece.open;
-    if (!webs && !small) continue;
-    ++(!piece.inside ? report.filled_bubbles : webs ? report.dropped_webs : report.dropped_pieces);
-    for (std::size_t i = piece.begin; i < piece.end; ++i) {
-      float& value = phi[found.voxels[i]];
-      value = piece.inside ? std::max(0.05f, -value) : std::min(-0.05f, -value);
+  const std::size_t n = blocks.size();
+  std::vector<BlockPieces> in(n);
+  parallel_for(
+      n, [&](std::size_t b) { in[b] = pieces_of(&phi[b * kVoxels]); }, 16);
+  std::vector<Index> first(n + 1, 0);
+  for (std::size_t b = 0; b < n; ++b) first[b + 1] = first[b] + static_cast<Index>(in[b].inside.size());
+
+  // Sets of neighbouring blocks that meet in a face.
+  parallel_for(
+      n,
+      [&](std::size_t b) {
+        constexpr std::size_t kSlot[3] = {22, 16, 14}, kStep[3] = {64, 8, 1};  // the next block along each axis
+        for (int axis = 0; axis < 3; ++axis) {
+          const Index other = blocks.around(b)[kSlot[axis]];
+          if (other == kNone) continue;
+          const std::size_t step = kStep[axis], others[2] = {axis == 0 ? 8u : 64u, axis == 2 ? 8u : 1u};
+          const std::size_t voxels = in[b].of.empty() && in[other].of.empty() ? 1 : kSide * kSide;
+          for (std::size_t r = 0; r < voxels; ++r) {
+            const std::size_t v = r / kSide * others[0] + r % kSide * others[1];
+            const std::uint16_t mine = in[b].at(v + 7 * step), theirs = in[other].at(v);
+            if (in[b].inside[mine] != in[other].inside[theirs]) continue;
+            const std::array<Index, 2> pair = {first[b] + Index{mine}, first[other] + Index{theirs}};
+            if (in[b].meeting.empty() || in[b].meeting.back() != pair) in[b].meeting.push_back(pair);
+          }
+        }
+      },
+      16);
+  DisjointSets sets(first[n]);
+  for (const BlockPieces& block : in)
+    for (const auto& [a, c] : block.meeting) sets.join(a, c);
+
+  struct Piece {
+    bool settled = false;  // a voxel at a corner of a particle's cell
+    bool open = false;     // reaches the rim of the blocks
+    Real volume = 0;       // [voxels], with a soft edge, the field's slope taken as one
+  };
+  std::vector<Piece> pieces(first[n]);
+  for (const Vec3& x : particles.x()) {
+    const Vec3 low = x.array().floor();
+    Index b = blocks.block_at(low);
+    for (int corner = 0; corner < 8; ++corner) {
+      const int i = static_cast<int>(low.x()) + (corner >> 2), j = static_cast<int>(low.y()) + ((corner >> 1) & 1), k = static_cast<int>(low.z()) + (corner & 1);
+      if (b == kNone || blocks.coords()[b] != BlockCoord{i >> 3, j >> 3, k >> 3}) b = blocks.block_at(Vec3(i, j, k));
+      if (b == kNone) continue;
+      pieces[sets.root(first[b] + Index{in[b].at(voxel_index(i & 7, j & 7, k & 7))})].settled = true;
     }
   }
+  if (least > 0)
+    for (std::size_t b = 0; b < n; ++b) {
+      const auto piece = [&](std::uint16_t k) -> Piece& { return pieces[sets.root(first[b] + Index{k})]; };
+      std::vector<Real> volume(in[b].inside.size(), 0.0);
+      for (std::size_t v = 0; v < kVoxels; ++v) volume[in[b].at(v)] += std::min(0.5 + static_cast<Real>(std::abs(phi[b * kVoxels + v])), 1.0);
+      for (std::size_t k = 0; k < volume.size(); ++k) piece(static_cast<std::uint16_t>(k)).volume += volume[k];
+      for (std::size_t face = 0; face < 6; ++face) {
+        constexpr std::size_t kSlot[6] = {4, 22, 10, 16, 12, 14}, kStep[3] = {64, 8, 1};  // beside the block, by axis
+        if (blocks.around(b)[kSlot[face]] != kNone) continue;
+        for (std::size_t v = 0; v < kVoxels; ++v) {
+          const std::uint16_t k = in[b].at(v);
+          if ((v / kStep[face / 2] & 7) == (face % 2 == 0 ? 0u : 7u) && !in[b].inside[k]) piece(k).open = true;
+        }
+      }
+    }
+
+  std::vector<std::uint8_t> dropped(first[n], 0);
+  for (std::size_t b = 0; b < n; ++b)
+    for (std::size_t k = 0; k < in[b].inside.size(); ++k) {
+      const Index name = first[b] + static_cast<Index>(k), root = sets.root(name);
+      const Piece& piece = pieces[root];
+      const bool web = in[b].inside[k] && !piece.settled, small = piece.volume < least && !piece.open;
+      if (!web && !small) continue;
+      dropped[name] = 1;
+      if (root == name) ++(!in[b].inside[k] ? report.filled_bubbles : web ? report.dropped_webs : report.dropped_pieces);
+    }
+  parallel_for(
+      n,
+      [&](std::size_t b) {
+        if (std::none_of(dropped.begin() + first[b], dropped.begin() + first[b + 1], [](std::uint8_t d) { return d != 0; })) return;
+        for (std::size_t v = 0; v < kVoxels; ++v) {
+          const std::uint16_t k = in[b].at(v);
+          float& value = phi[b * kVoxels + v];
+          if (dropped[first[b] + k]) value = in[b].inside[k] ? std::max(0.05f, -value) : std::min(-0.05f, -value);
+        }
+      },
+      64);
 }
 
 }  // namespace effuse::skin

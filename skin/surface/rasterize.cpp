@@ -1,7 +1,9 @@
 #include "skin/surface/rasterize.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstring>
 
 #include "geometry/base/parallel.h"
 #include "geometry/base/zones.h"
@@ -93,6 +95,242 @@ EFFUSE_CLONES void gather_block(const Candidates& near, Narrowed& slab, Narrowed
   }
 }
 
+// Finer voxels: sums on every second one, cubic between.
+
+constexpr int kNodes = kSide / 2;  // along a block's side
+constexpr std::size_t kBlockNodes = kNodes * kNodes * kNodes;
+/// Nodes are no farther apart than a quarter of the reach: cubic interpolation of the sums is right to 1e-3 of them.
+constexpr float kFineReach = 8;
+/// A point this near to a particle [spacings] is in lava or beside it: holes of dense packings are 0.87 wide.
+constexpr float kCovered = 1;
+
+/// W, sum w x, sum w r and the squared distance of the nearest particle at a block's nodes; x from the block's voxel (0, 0, 0).
+struct NodeSums {
+  std::array<float, kBlockNodes> W, x, y, z, r, nearest;
+};
+
+/// Two rows of four nodes at a time.
+EFFUSE_CLONES void gather_nodes(const Candidates& near, Narrowed& slab, const RasterOptions& o, NodeSums& out) {
+  const float R2 = o.reach * o.reach, inverse_R2 = 1 / R2;
+  const Row zero{}, lane_y = {0, 0, 0, 0, 2, 2, 2, 2}, lane_z = {0, 2, 4, 6, 0, 2, 4, 6};
+  const std::size_t n = near.size();
+  for (int i = 0; i < kNodes; ++i) {
+    std::size_t in_slab = 0;
+    for (std::size_t c = 0; c < n; ++c) {
+      const float dx = near.x[c] - static_cast<float>(2 * i), d2 = dx * dx;
+      slab.d2[in_slab] = d2;
+      slab.dx[in_slab] = near.x[c];
+      slab.dy[in_slab] = near.y[c];
+      slab.z[in_slab] = near.z[c];
+      slab.r[in_slab] = near.r[c];
+      in_slab += d2 < R2;
+    }
+    for (int j = 0; j < kNodes; j += 2) {
+      Row W = zero, wx = zero, wy = zero, wz = zero, wr = zero, nearest = zero + R2;
+      const float low = static_cast<float>(2 * j), high = low + 2;
+      const Row at_y = lane_y + low;
+      for (std::size_t c = 0; c < in_slab; ++c) {
+        const float y = slab.dy[c], beside = y < low ? low - y : y > high ? y - high : 0;
+        if (slab.d2[c] + beside * beside >= R2) continue;
+        const Row dy = y - at_y, dz = slab.z[c] - lane_z, d2 = dy * dy + dz * dz + slab.d2[c];
+        Row t = 1 - d2 * inverse_R2;
+        t = t > zero ? t : zero;
+        const Row w = t * t * t;
+        W += w;
+        wx += w * slab.dx[c];
+        wy += w * y;
+        wz += w * slab.z[c];
+        wr += w * slab.r[c];
+        nearest = d2 < nearest ? d2 : nearest;
+      }
+      for (int k = 0; k < 8; ++k) {
+        const std::size_t node = static_cast<std::size_t>((i * kNodes + j) * kNodes + k);
+        out.W[node] = W[k];
+        out.x[node] = wx[k];
+        out.y[node] = wy[k];
+        out.z[node] = wz[k];
+        out.r[node] = wr[k];
+        out.nearest[node] = nearest[k];
+      }
+    }
+  }
+}
+
+/// Nodes -1 .. 5 of a block along each axis, z fastest and padded to 8.
+struct NodesAround {
+  static constexpr int kWide = 7;
+  std::array<std::array<Row, kWide * kWide>, 5> sums;   // W, x, y, z, r
+  std::array<std::array<float, 8>, kWide * kWide> nearest;  // [voxels], not squared
+};
+
+void collect(const Blocks& blocks, const std::vector<NodeSums>& nodes, float reach, std::size_t b, NodesAround& out) {
+  for (int i = -1; i < NodesAround::kWide - 1; ++i)
+    for (int j = -1; j < NodesAround::kWide - 1; ++j) {
+      const std::size_t row = static_cast<std::size_t>((i + 1) * NodesAround::kWide + j + 1);
+      for (int k = -1; k < NodesAround::kWide; ++k) {
+        const std::size_t lane = static_cast<std::size_t>(k + 1);
+        const int da = i < 0 ? -1 : i / kNodes, db = j < 0 ? -1 : j / kNodes, dc = k < 0 ? -1 : k / kNodes;
+        const Index block = k == NodesAround::kWide - 1 ? kNone : blocks.around(b)[static_cast<std::size_t>((da + 1) * 9 + (db + 1) * 3 + dc + 1)];
+        if (block == kNone) {
+          for (auto& sum : out.sums) sum[row][lane] = 0;
+          out.nearest[row][lane] = reach;
+          continue;
+        }
+        const std::size_t node = static_cast<std::size_t>(((i & 3) * kNodes + (j & 3)) * kNodes + (k & 3));
+        const NodeSums& from = nodes[block];
+        const float W = from.W[node], side = kSide;
+        out.sums[0][row][lane] = W;
+        out.sums[1][row][lane] = from.x[node] + W * side * static_cast<float>(da);
+        out.sums[2][row][lane] = from.y[node] + W * side * static_cast<float>(db);
+        out.sums[3][row][lane] = from.z[node] + W * side * static_cast<float>(dc);
+        out.sums[4][row][lane] = from.r[node];
+        out.nearest[row][lane] = std::sqrt(from.nearest[node]);
+      }
+    }
+}
+
+/// Cubic through four nodes, in the middle.
+template <class T>
+void middle(const T& a, const T& b, const T& c, const T& d, T& to) {
+  to = (9 * (b + c) - (a + d)) * (1.0f / 16);
+}
+
+/// The five sums at the block's voxels.
+EFFUSE_CLONES void interpolate(const NodesAround& nodes, std::array<std::array<Row, kSide * kSide>, 5>& out) {
+  constexpr std::size_t kWide = NodesAround::kWide;
+  std::array<Row, kSide * kWide> along_x;
+  std::array<float, 8> z;
+  for (std::size_t f = 0; f < 5; ++f) {
+    const auto& in = nodes.sums[f];
+    for (std::size_t q = 0; q < kNodes; ++q)
+      for (std::size_t j = 0; j < kWide; ++j) {
+        along_x[2 * q * kWide + j] = in[(q + 1) * kWide + j];
+        middle(in[q * kWide + j], in[(q + 1) * kWide + j], in[(q + 2) * kWide + j], in[(q + 3) * kWide + j], along_x[(2 * q + 1) * kWide + j]);
+      }
+    for (std::size_t i = 0; i < kSide; ++i)
+      for (std::size_t q = 0; q < kNodes; ++q) {
+        const Row* in_y = &along_x[i * kWide + q];
+        Row rows[2] = {in_y[1], in_y[1]};
+        middle(in_y[0], in_y[1], in_y[2], in_y[3], rows[1]);
+        for (std::size_t h = 0; h < 2; ++h) {
+          Row& to = out[f][i * kSide + 2 * q + h];
+          std::memcpy(z.data(), &rows[h], sizeof(Row));
+          for (std::size_t k = 0; k < kNodes; ++k) {
+            to[2 * k] = z[k + 1];
+            float between = 0;
+            middle(z[k], z[k + 1], z[k + 2], z[k + 3], between);
+            to[2 * k + 1] = between;
+          }
+        }
+      }
+  }
+}
+
+/// Squared distance of the nearest particle at the eight voxels of row (i, j).
+EFFUSE_CLONES void nearest_in_row(const Candidates& near, float i, float j, float R2, float* out) {
+  const Row lane = {0, 1, 2, 3, 4, 5, 6, 7};
+  Row nearest = Row{} + R2;
+  for (std::size_t c = 0; c < near.size(); ++c) {
+    const float dx = near.x[c] - i, dy = near.y[c] - j;
+    const Row dz = near.z[c] - lane, d2 = dz * dz + (dx * dx + dy * dy);
+    nearest = d2 < nearest ? d2 : nearest;
+  }
+  std::memcpy(out, &nearest, sizeof nearest);
+}
+
+/// The field on the block's voxels from the sums at its nodes; near(): the block's particles, asked for where the bound between
+/// separate particles may count.
+template <class Near>
+void field_from_nodes(const NodesAround& nodes, const RasterOptions& o, Near&& near, float* phi, float* weight) {
+  std::array<std::array<Row, kSide * kSide>, 5> sums;
+  interpolate(nodes, sums);
+  const float counts = o.spacing / 2 + 2;  // farther out the bound only makes the field steeper
+  for (int i = 0; i < kSide; ++i)
+    for (int j = 0; j < kSide; ++j) {
+      const std::size_t row = static_cast<std::size_t>(i * kSide + j);
+      float* out = phi + row * kSide;
+      bool bound_counts = false;
+      for (int k = 0; k < kSide; ++k) {
+        const float W = sums[0][row][k];
+        weight[row * kSide + static_cast<std::size_t>(k)] = std::max(W, 0.0f);
+        out[k] = o.outside;
+        if (W < 1e-3f) continue;  // farther than the bound lets lava be
+        const float inverse = 1 / W;
+        const float x = sums[1][row][k] * inverse - static_cast<float>(i), y = sums[2][row][k] * inverse - static_cast<float>(j),
+                    z = sums[3][row][k] * inverse - static_cast<float>(k);
+        out[k] = std::min(o.outside, std::sqrt(x * x + y * y + z * z) - o.radius_factor * sums[4][row][k] * inverse);
+        // The nearest particle is no farther than that of a node plus the way there.
+        constexpr float kWay[4] = {0, 1, 1.4142136f, 1.7320508f};
+        const std::size_t node = static_cast<std::size_t>((i / 2 + 1) * NodesAround::kWide + j / 2 + 1);
+        const float farthest = nodes.nearest[node][static_cast<std::size_t>(k / 2 + 1)] + kWay[(i & 1) + (j & 1) + (k & 1)];
+        bound_counts = bound_counts || (out[k] < counts && kBoundSlope * (farthest - kBound * o.spacing) > out[k]);
+      }
+      if (!bound_counts) continue;
+      float nearest[kSide];
+      nearest_in_row(near(), static_cast<float>(i), static_cast<float>(j), o.reach * o.reach, nearest);
+      for (int k = 0; k < kSide; ++k)
+        if (out[k] < counts) out[k] = std::max(out[k], kBoundSlope * (std::sqrt(nearest[k]) - kBound * o.spacing));
+    }
+  for (std::size_t v = 0; v < kVoxels; ++v) phi[v] = std::min(phi[v], o.outside);
+}
+
+/// Particles within reach of a voxel of the block.
+void candidates(const ParticleGrid& particles, const BlockCoord& coord, Real reach, Candidates& near) {
+  const Vec3 low(coord[0] * kSide, coord[1] * kSide, coord[2] * kSide), high = low + Vec3::Constant(kSide - 1);
+  near.clear();
+  particles.runs(low - Vec3::Constant(reach), high + Vec3::Constant(reach), [&](Index from, Index to) {
+    for (Index i = from; i < to; ++i) {
+      const Vec3& p = particles.x()[i];
+      if ((p - p.cwiseMax(low).cwiseMin(high)).squaredNorm() >= reach * reach) continue;
+      near.x.push_back(static_cast<float>(p.x() - low.x()));
+      near.y.push_back(static_cast<float>(p.y() - low.y()));
+      near.z.push_back(static_cast<float>(p.z() - low.z()));
+      near.r.push_back(particles.radius()[i]);
+    }
+  });
+}
+
+void rasterize_fine(const ParticleGrid& particles, const Blocks& blocks, const RasterOptions& o, Field& phi, Field& weight) {
+  std::vector<NodeSums> nodes(blocks.size());
+  std::vector<std::uint8_t> covered(blocks.size(), 0);
+  const float covered2 = kCovered * o.spacing * kCovered * o.spacing;
+  parallel_ranges(blocks.size(), 8, [&](std::size_t begin, std::size_t end) {
+    Candidates near;
+    Narrowed slab;
+    for (std::size_t b = begin; b < end; ++b) {
+      candidates(particles, blocks.coords()[b], o.reach, near);
+      slab.resize(near.size() + 1);
+      gather_nodes(near, slab, o, nodes[b]);
+      covered[b] = *std::max_element(nodes[b].nearest.begin(), nodes[b].nearest.end()) < covered2;
+    }
+  });
+  parallel_ranges(blocks.size(), 8, [&](std::size_t begin, std::size_t end) {
+    Candidates near;
+    NodesAround around;
+    for (std::size_t b = begin; b < end; ++b) {
+      float* out = &phi[b * kVoxels];
+      const auto& beside = blocks.around(b);
+      const float W = *std::max_element(nodes[b].W.begin(), nodes[b].W.end());
+      if (W == 0) {
+        std::fill_n(out, kVoxels, o.outside);
+        std::fill_n(&weight[b * kVoxels], kVoxels, 0.0f);
+      } else if (std::all_of(beside.begin(), beside.end(), [&](Index k) { return k != kNone && covered[k]; })) {
+        // Two spacings from the next gap: deep inside.
+        std::fill_n(out, kVoxels, -o.radius_factor * nodes[b].r[0] / nodes[b].W[0]);
+        std::fill_n(&weight[b * kVoxels], kVoxels, nodes[b].W[0]);
+      } else {
+        collect(blocks, nodes, o.reach, b, around);
+        near.clear();
+        const auto found = [&]() -> const Candidates& {
+          if (near.size() == 0) candidates(particles, blocks.coords()[b], o.reach, near);
+          return near;
+        };
+        field_from_nodes(around, o, found, out, &weight[b * kVoxels]);
+      }
+    }
+  });
+}
+
 }  // namespace
 
 Blocks blocks_around(const ParticleGrid& particles, Real reach) {
@@ -124,24 +362,12 @@ void rasterize(const ParticleGrid& particles, const Blocks& blocks, const Raster
   ZONE("skin.rasterize");
   phi.resize(blocks.size() * kVoxels);
   weight.resize(blocks.size() * kVoxels);
-  const Real reach = options.reach;
+  if (options.reach >= kFineReach) return rasterize_fine(particles, blocks, options, phi, weight);
   parallel_ranges(blocks.size(), 8, [&](std::size_t begin, std::size_t end) {
     Candidates near;
     Narrowed slab, row;
     for (std::size_t b = begin; b < end; ++b) {
-      const BlockCoord& coord = blocks.coords()[b];
-      const Vec3 low(coord[0] * kSide, coord[1] * kSide, coord[2] * kSide), high = low + Vec3::Constant(kSide - 1);
-      near.clear();
-      particles.runs(low - Vec3::Constant(reach), high + Vec3::Constant(reach), [&](Index from, Index to) {
-        for (Index i = from; i < to; ++i) {
-          const Vec3& p = particles.x()[i];
-          if ((p - p.cwiseMax(low).cwiseMin(high)).squaredNorm() >= reach * reach) continue;
-          near.x.push_back(static_cast<float>(p.x() - low.x()));
-          near.y.push_back(static_cast<float>(p.y() - low.y()));
-          near.z.push_back(static_cast<float>(p.z() - low.z()));
-          near.r.push_back(particles.radius()[i]);
-        }
-      });
+      candidates(particles, blocks.coords()[b], options.reach, near);
       if (near.size() == 0) {
         std::fill_n(&phi[b * kVoxels], kVoxels, options.outside);
         std::fill_n(&weight[b * kVoxels], kVoxels, 0.0f);

@@ -23,7 +23,9 @@ Blocks blocks_around(const ParticleGrid& particles, Real reach);
 ///
 ///   phi     out: the field [voxels]
 ///   weight  out: W
-/// Gathered block by block in float, coordinates counted from the block; within 1e-4 voxels of double.
+/// Gathered block by block in float, coordinates counted from the block; within 1e-4 voxels of double. From a reach of eight
+/// voxels on the sums are taken at every second voxel and cubic between: near the surface within 0.05 spacings, 0.003 on average.
+/// Blocks that lie two spacings and more from any point without a particle within one spacing are filled with one value.
 /// Same bits on any number of threads and any order of the points.
 void rasterize(const ParticleGrid& particles, const Blocks& blocks, const RasterOptions& options, Field& phi, Field& weight);
 

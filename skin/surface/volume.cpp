@@ -49,68 +49,107 @@ EFFUSE_CLONES void corner_sums(float* v) {
   for (std::size_t i = 0; i < 900; ++i) v[i] += v[i + 100];
 }
 
+/// Volumes enclosed by one field at different shifts.
+class Enclosed {
+ public:
+  Enclosed(const Blocks& blocks, float outside, const Field& phi, const Field& above) : blocks_(blocks), outside_(outside), phi_(phi), above_(above), range_(blocks.size()), full_(blocks.size(), -1) {
+    parallel_for(
+        blocks.size(),
+        [&](std::size_t b) {
+          const auto [low, high] = std::minmax_element(&phi[b * kVoxels], &phi[b * kVoxels] + kVoxels);
+          range_[b] = {*low, *high};
+        },
+        64);
+  }
+  Real operator()(float shift) {
+    return parallel_sum(
+        blocks_.size(), Real{0}, [&](std::size_t b) { return of_block(b, shift); }, 32);
+  }
+
+ private:
+  struct Range {
+    float low, high;
+  };
+
+  /// Of the cells that begin at the block's voxels.
+  Real of_block(std::size_t b, float shift) {
+    Range range = range_[b];
+    for (const std::size_t slot : {14u, 16u, 17u, 22u, 23u, 25u, 26u}) {
+      const Index other = blocks_.around(b)[slot];
+      const Range beyond = other == kNone ? Range{outside_, outside_} : range_[other];
+      range = {std::min(range.low, beyond.low), std::max(range.high, beyond.high)};
+    }
+    if (range.low >= shift) return 0;
+    const bool whole = range.high < shift;
+    if (whole && above_.empty()) return kVoxels;
+    if (whole && full_[b] >= 0) return full_[b];
+    float p[1000], inside[1000], open[1000];
+    blocks_.padded(phi_, outside_, b, p);
+    for (std::size_t v = 0; v < 1000; ++v) inside[v] = p[v] < shift ? 1.0f : 0.0f;
+    corner_sums(inside);
+    if (!above_.empty()) {
+      blocks_.padded(above_, 1, b, open);
+      corner_sums(open);
+    }
+    float sum = 0;  // at most 512, of terms at most 1
+    for (int i = 1; i <= kSide; ++i)
+      for (int j = 1; j <= kSide; ++j)
+        for (int k = 1; k <= kSide; ++k) {
+          const int at = i * 100 + j * 10 + k;
+          if (inside[at] == 0) continue;
+          const float share = inside[at] == 8 ? 1 : negative_share_of_cell(p + at, shift);
+          sum += above_.empty() ? share : share * open[at] / 8;
+        }
+    if (whole) full_[b] = sum;
+    return static_cast<Real>(sum);
+  }
+
+  const Blocks& blocks_;
+  float outside_;
+  const Field &phi_, &above_;
+  std::vector<Range> range_;  // of each block's values
+  std::vector<float> full_;   // a block's volume when all of it is inside; -1: not asked yet
+};
+
 }  // namespace
 
 Real enclosed(const Blocks& blocks, float outside, const Field& phi, const Field& above, float shift) {
-  return parallel_sum(
-      blocks.size(), Real{0},
-      [&](std::size_t b) {
-        float p[1000], inside[1000], open[1000];
-        blocks.padded(phi, outside, b, p);
-        bool any = false;
-        for (std::size_t v = 0; v < 1000; ++v) {
-          inside[v] = p[v] < shift ? 1.0f : 0.0f;
-          any = any || p[v] < shift;
-        }
-        if (!any) return Real{0};
-        corner_sums(inside);
-        if (!above.empty()) {
-          blocks.padded(above, 1, b, open);
-          corner_sums(open);
-        }
-        float sum = 0;  // at most 512, of terms at most 1
-        for (int i = 1; i <= kSide; ++i)
-          for (int j = 1; j <= kSide; ++j)
-            for (int k = 1; k <= kSide; ++k) {
-              const int at = i * 100 + j * 10 + k;
-              if (inside[at] == 0) continue;
-              const float share = inside[at] == 8 ? 1 : negative_share_of_cell(p + at, shift);
-              sum += above.empty() ? share : share * open[at] / 8;
-            }
-        return static_cast<Real>(sum);
-      },
-      32);
+  return Enclosed(blocks, outside, phi, above)(shift);
 }
 
 float matching_shift(const Blocks& blocks, float outside, const Field& phi, const Field& above, Real target, float most) {
   ZONE("skin.match_volume");
-  const auto excess = [&](float shift) { return enclosed(blocks, outside, phi, above, shift) / target - 1; };
-  constexpr Real kEnough = 1e-4;
+  Enclosed volume(blocks, outside, phi, above);
+  // In whole steps, so that a frame of which little has changed is shifted as the one before.
+  const auto excess = [&](int k) { return volume(static_cast<float>(k) / kShiftSteps) / target - 1; };
+  const int end = static_cast<int>(most * kShiftSteps);
   // Out from zero by steps that double until the target lies between (a first one usually does), then regula falsi with
   // the weight of an end that stays halved (Illinois): the volume rises with the shift, but may jump (pieces, thin sheets).
-  float low = 0, high = 0;
+  int low = 0, high = 0;
   Real at_low = excess(0), at_high = at_low;
-  if (std::abs(at_low) < kEnough) return 0;
-  for (float step = most / 8; at_low > 0 || at_high < 0; step *= 2) {
+  for (int step = std::max(1, end / 8); at_low > 0 || at_high < 0; step *= 2) {
     const bool outward = at_high < 0;
-    if ((outward && high >= most) || (!outward && low <= -most)) return outward ? most : -most;
+    if ((outward && high >= end) || (!outward && low <= -end)) break;
     if (outward) {
       low = high;
       at_low = at_high;
-      high = std::min(most, high + step);
+      high = std::min(end, high + step);
       at_high = excess(high);
     } else {
       high = low;
       at_high = at_low;
-      low = std::max(-most, low - step);
+      low = std::max(-end, low - step);
       at_low = excess(low);
     }
   }
-  int stayed = 0;
-  for (int i = 0; i < 20; ++i) {
-    const float middle = low + (high - low) * static_cast<float>(at_low / (at_low - at_high));
+  int stayed = 0, best = std::abs(at_low) <= std::abs(at_high) ? low : high;
+  Real at_best = best == low ? at_low : at_high;
+  while (high - low > 1 && at_low < 0 && at_high > 0) {
+    const Real slope = (at_high - at_low) / (high - low);
+    const int middle = std::clamp(static_cast<int>(std::lround(low - at_low / slope)), low + 1, high - 1);
     const Real at_middle = excess(middle);
-    if (std::abs(at_middle) < kEnough || high - low < 1e-4f) return middle;
+    if (std::abs(at_middle) <= std::abs(at_best)) best = middle, at_best = at_middle;
+    if (std::abs(at_middle) <= slope / 2) break;
     if (at_middle < 0) {
       low = middle;
       at_low = at_middle;
@@ -123,7 +162,7 @@ float matching_shift(const Blocks& blocks, float outside, const Field& phi, cons
       stayed = -1;
     }
   }
-  return (low + high) / 2;
+  return static_cast<float>(best) / kShiftSteps;
 }
 
 Real volume_above_ground(const LevelSet& surface, const geometry::Terrain* terrain) {

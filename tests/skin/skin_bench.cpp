@@ -5,6 +5,8 @@
 #include <openvdb/openvdb.h>
 #include <openvdb/points/PointConversion.h>
 #include <openvdb/points/PointRasterizeSDF.h>
+#include <openvdb/tools/LevelSetFilter.h>
+#include <openvdb/tools/VolumeToMesh.h>
 
 #include <cmath>
 #include <filesystem>
@@ -45,6 +47,8 @@ struct Lava {
     points.velocity = velocity;
   }
   Lava(const Lava&) = delete;
+  /// Positions and radii only.
+  void bare() { points.temperature = points.crust = {}, points.velocity = {}; }
 };
 
 /// Waves of half a metre under it.
@@ -68,31 +72,56 @@ void finish(benchmark::State& state, const Lava& lava, std::uint64_t hash) {
   state.counters["particles/s"] = benchmark::Counter(static_cast<double>(lava.x.size()), benchmark::Counter::kIsIterationInvariantRate);
 }
 
+constexpr Real kVoxel = 0.25;  // half a particle's radius
+
+openvdb::FloatGrid::Ptr smooth_spheres(const Lava& lava) {
+  std::vector<openvdb::Vec3R> positions;
+  for (const Vec3& p : lava.x) positions.emplace_back(p.x(), p.y(), p.z());
+  const auto transform = openvdb::math::Transform::createLinearTransform(kVoxel);
+  const openvdb::points::PointAttributeVector<openvdb::Vec3R> wrapper(positions);
+  const auto index = openvdb::tools::createPointIndexGrid<openvdb::tools::PointIndexGrid>(wrapper, *transform);
+  const auto grid =
+      openvdb::points::createPointDataGrid<openvdb::points::NullCodec, openvdb::points::PointDataGrid>(*index, wrapper, *transform);
+  return openvdb::points::rasterizeSmoothSpheres(*grid, 0.6, 2.0);
+}
+
 void open_vdb_smooth_spheres(benchmark::State& state) {
   const Lava lava(static_cast<std::size_t>(state.range(0)), static_cast<int>(state.range(1)));
   openvdb::initialize();
   std::uint64_t voxels = 0;
-  for (auto _ : state) {
-    std::vector<openvdb::Vec3R> positions;
-    for (const Vec3& p : lava.x) positions.emplace_back(p.x(), p.y(), p.z());
-    const auto transform = openvdb::math::Transform::createLinearTransform(0.5);
-    const openvdb::points::PointAttributeVector<openvdb::Vec3R> wrapper(positions);
-    const auto index = openvdb::tools::createPointIndexGrid<openvdb::tools::PointIndexGrid>(wrapper, *transform);
-    const auto grid =
-        openvdb::points::createPointDataGrid<openvdb::points::NullCodec, openvdb::points::PointDataGrid>(*index, wrapper, *transform);
-    voxels = openvdb::points::rasterizeSmoothSpheres(*grid, 0.6, 2.0)->activeVoxelCount();
-  }
+  for (auto _ : state) voxels = smooth_spheres(lava)->activeVoxelCount();
   finish(state, lava, voxels);
 }
+
+/// OpenVDB's own way to a smooth skin; its cheapest filter (mean curvature), or the one most use (gaussian).
+void open_vdb_route(benchmark::State& state, bool gaussian) {
+  const Lava lava(static_cast<std::size_t>(state.range(0)), static_cast<int>(state.range(1)));
+  openvdb::initialize();
+  std::uint64_t quads_made = 0;
+  for (auto _ : state) {
+    const auto grid = smooth_spheres(lava);
+    openvdb::tools::LevelSetFilter<openvdb::FloatGrid> filter(*grid);
+    if (gaussian) filter.gaussian(1);
+    else filter.meanCurvature();
+    std::vector<openvdb::Vec3s> points;
+    std::vector<openvdb::Vec3I> triangles;
+    std::vector<openvdb::Vec4I> quads;
+    openvdb::tools::volumeToMesh(*grid, points, triangles, quads, 0.0, 0.0);
+    quads_made = quads.size();
+  }
+  finish(state, lava, quads_made);
+}
+void open_vdb_route_mean_curvature(benchmark::State& state) { open_vdb_route(state, false); }
+void open_vdb_route_gaussian(benchmark::State& state) { open_vdb_route(state, true); }
 
 void particles_to_field(benchmark::State& state) {
   const Lava lava(static_cast<std::size_t>(state.range(0)), static_cast<int>(state.range(1)));
   StateHash hash;
   for (auto _ : state) {
-    const ParticleGrid particles(lava.points, 0.5, 2);
-    const Blocks blocks = blocks_around(particles, 4);
+    const ParticleGrid particles(lava.points, kVoxel, 4);
+    const Blocks blocks = blocks_around(particles, 8);
     Field phi, weight;
-    rasterize(particles, blocks, {}, phi, weight);
+    rasterize(particles, blocks, {.reach = 8, .spacing = 4, .outside = 5.6f}, phi, weight);
     hash = {};
     hash.add(std::span<const float>(phi));
   }
@@ -107,6 +136,23 @@ void build_on_ground(benchmark::State& state) {
   finish(state, lava, voxels);
 }
 
+std::uint64_t hash_of(const geometry::TriMesh& mesh) {
+  StateHash hash;
+  hash.add(std::span<const Vec3>(mesh.positions));
+  return hash.value();
+}
+
+/// Level set, smoothing, volume, mesh, normals; no ground, as OpenVDB's route has none.
+void whole_skin(benchmark::State& state) {
+  Lava lava(static_cast<std::size_t>(state.range(0)), static_cast<int>(state.range(1)));
+  lava.bare();
+  LevelSetOptions options = metre();
+  options.voxel = kVoxel;
+  std::uint64_t hash = 0;
+  for (auto _ : state) hash = hash_of(mesh_level_set(build_level_set(lava.points, static_cast<Real>(lava.x.size()), nullptr, options)));
+  finish(state, lava, hash);
+}
+
 /// A built level set, then one step after it.
 template <class Step>
 void after_building(benchmark::State& state, Step&& step) {
@@ -116,12 +162,6 @@ void after_building(benchmark::State& state, Step&& step) {
   std::uint64_t result = 0;
   for (auto _ : state) result = step(surface, terrain);
   finish(state, lava, result);
-}
-
-std::uint64_t hash_of(const geometry::TriMesh& mesh) {
-  StateHash hash;
-  hash.add(std::span<const Vec3>(mesh.positions));
-  return hash.value();
 }
 
 void mesh(benchmark::State& state) {
@@ -152,8 +192,16 @@ void vdb(benchmark::State& state) {
 void sizes(benchmark::internal::Benchmark* b) {
   b->Args({100000, 0})->Args({100000, 3})->Unit(benchmark::kMillisecond)->UseRealTime()->MeasureProcessCPUTime();
 }
-BENCHMARK(open_vdb_smooth_spheres)->Apply(sizes);
-BENCHMARK(particles_to_field)->Apply(sizes);
+void three_sizes(benchmark::internal::Benchmark* b) {
+  for (const int n : {20000, 100000, 500000})
+    for (const int layers : {0, 3}) b->Args({n, layers});
+  b->Unit(benchmark::kMillisecond)->UseRealTime()->MeasureProcessCPUTime();
+}
+BENCHMARK(open_vdb_smooth_spheres)->Apply(three_sizes);
+BENCHMARK(particles_to_field)->Apply(three_sizes);
+BENCHMARK(open_vdb_route_mean_curvature)->Apply(three_sizes);
+BENCHMARK(open_vdb_route_gaussian)->Args({100000, 0})->Unit(benchmark::kMillisecond)->UseRealTime()->MeasureProcessCPUTime();
+BENCHMARK(whole_skin)->Apply(three_sizes);
 BENCHMARK(build_on_ground)->Apply(sizes);
 BENCHMARK(mesh)->Apply(sizes);
 BENCHMARK(mesh_and_displace)->Apply(sizes);
