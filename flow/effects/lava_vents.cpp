@@ -43,11 +43,44 @@ PlannedVent read_vent(Parameters& p, Real temperature) {
   return planned;
 }
 
+/// Distance in plan of a point from a fissure [m].
+Real distance(const Vec2& p, const Vec2& from, const Vec2& to) {
+  const Vec2 along = to - from;
+  const Real length2 = along.squaredNorm(), t = length2 > 0 ? std::clamp((p - from).dot(along) / length2, 0.0, 1.0) : 0;
+  return (p - from - t * along).norm();
+}
+
+/// Distance in plan between the middles of two vents [m]; 0 where fissures cross.
+Real distance(const PlannedVent& a, const PlannedVent& b) {
+  const auto side = [](const Vec2& from, const Vec2& to, const Vec2& p) {
+    const Vec2 u = to - from, v = p - from;
+    return u.x() * v.y() - u.y() * v.x();
+  };
+  const bool cross = side(a.from, a.to, b.from) * side(a.from, a.to, b.to) < 0 && side(b.from, b.to, a.from) * side(b.from, b.to, a.to) < 0;
+  return cross ? 0 : std::min({distance(a.from, b.from, b.to), distance(a.to, b.from, b.to), distance(b.from, a.from, a.to), distance(b.to, a.from, a.to)});
+}
+
+/// Two vents that are open at one time in one place would press their lava into each other.
+void refuse_overlaps(const std::vector<PlannedVent>& vents, std::vector<Parameters>& tables) {
+  for (std::size_t j = 0; j < vents.size(); ++j)
+    for (std::size_t i = 0; i < j; ++i) {
+      const PlannedVent &a = vents[i], &b = vents[j];
+      if (!a.located || !b.located || a.vent.rate <= 0 || b.vent.rate <= 0) continue;
+      if (a.vent.stop <= b.vent.start || b.vent.stop <= a.vent.start) continue;
+      const Real apart = distance(a, b), wanted = (a.vent.width + b.vent.width) / 2;
+      if (apart < wanted)
+        tables[j].fault(tables[j].has("at") ? "at" : "from",
+                        fmt::format("vents {} and {} are open at one time and {:.3g} m apart, wanted {:.3g} m (half of both widths): make them one, with both rates", i + 1, j + 1, apart, wanted));
+    }
+}
+
 }  // namespace
 
 std::vector<PlannedVent> read_vents(Parameters& lava, Real temperature) {
   std::vector<PlannedVent> vents;
-  for (Parameters& vent : lava.tables("vent", "where lava comes out; at least one")) vents.push_back(read_vent(vent, temperature));
+  std::vector<Parameters> tables = lava.tables("vent", "where lava comes out; at least one");
+  for (Parameters& vent : tables) vents.push_back(read_vent(vent, temperature));
+  refuse_overlaps(vents, tables);
   if (vents.empty()) lava.fault("vent", "lava has no vent, wanted at least one table [[lava.vent]]");
   return vents;
 }

@@ -22,6 +22,7 @@
 #include "samples/effuse/frame_writer.h"
 #include "samples/effuse/load_scene.h"
 #include "samples/effuse/progress.h"
+#include "samples/effuse/remove_run.h"
 
 namespace effuse {
 
@@ -227,7 +228,7 @@ ExitCode run(const RunCommand& command, const CommonOptions& common) {
       log_info("no checkpoint yet: starting from the first frame");
     }
   } else if (was_there) {
-    for (const char* old : {"frames", "preview", "maps", "checkpoints", "flow.csv", "run.json", "manifest.json"}) fs::remove_all(folder / old);
+    remove_run(folder);
   }
 
   FrameWriter writer(scene, loaded->skin, *loaded->terrain, folder);

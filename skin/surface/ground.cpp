@@ -42,16 +42,15 @@ struct GroundLattice {
   }
 };
 
-GroundLattice lattice_of(const LevelSet::Impl& s, const geometry::Terrain& terrain, std::size_t b, Real reach) {
+GroundLattice lattice_of(const BlockCoord& c, const Vec3& origin, Real voxel, const geometry::Terrain& terrain, Real reach) {
   GroundLattice lattice;
-  const BlockCoord& c = s.blocks.coords()[b];
   for (int i = 0; i < 5; ++i)
     for (int j = 0; j < 5; ++j)
       for (int k = 0; k < 5; ++k) {
         const Vec3 p(kSide * c[0] + 2 * i, kSide * c[1] + 2 * j, kSide * c[2] + 2 * k);
-        const geometry::Contact contact = terrain.contact(s.world(p), reach);
+        const geometry::Contact contact = terrain.contact(origin + voxel * p, reach);
         GroundLattice::Node& node = lattice.nodes[static_cast<std::size_t>(i * 25 + j * 5 + k)];
-        node.distance = contact.any() ? static_cast<float>(contact.distance / s.voxel) : kNoGround;
+        node.distance = contact.any() ? static_cast<float>(contact.distance / voxel) : kNoGround;
         node.nx = static_cast<float>(contact.normal.x());
         node.ny = static_cast<float>(contact.normal.y());
         node.nz = static_cast<float>(contact.normal.z());
@@ -63,21 +62,21 @@ constexpr float kHalfDiagonal = 6.1f;  // of a block's voxel centres: 3.5 sqrt(3
 
 }  // namespace
 
-GroundField sample_ground(const LevelSet::Impl& s, const geometry::Terrain& terrain, float reach) {
+GroundField sample_ground(const Blocks& blocks, const Vec3& origin, Real voxel, const geometry::Terrain& terrain, float reach) {
   ZONE("skin.ground");
   GroundField ground;
-  ground.distance.assign(s.blocks.size() * kVoxels, kNoGround);
-  ground.above.assign(s.blocks.size() * kVoxels, 1.0f);
-  ground.normal.assign(s.blocks.size() * kVoxels, {0, 0, 1});
+  ground.distance.assign(blocks.size() * kVoxels, kNoGround);
+  ground.above.assign(blocks.size() * kVoxels, 1.0f);
+  ground.normal.assign(blocks.size() * kVoxels, {0, 0, 1});
   // The lattice reaches a voxel beyond the block, the block to half its diagonal, and interpolation needs both ends.
-  const Real search = s.voxel * static_cast<Real>(reach + 2 * kHalfDiagonal + 4);
+  const Real search = voxel * static_cast<Real>(reach + 2 * kHalfDiagonal + 4);
   parallel_for(
-      s.blocks.size(),
+      blocks.size(),
       [&](std::size_t b) {
-        const BlockCoord& c = s.blocks.coords()[b];
+        const BlockCoord& c = blocks.coords()[b];
         const Vec3 middle(kSide * c[0] + 3.5, kSide * c[1] + 3.5, kSide * c[2] + 3.5);
-        const geometry::Contact at_middle = terrain.contact(s.world(middle), search);
-        const float d = at_middle.any() ? static_cast<float>(at_middle.distance / s.voxel) : kNoGround;
+        const geometry::Contact at_middle = terrain.contact(origin + voxel * middle, search);
+        const float d = at_middle.any() ? static_cast<float>(at_middle.distance / voxel) : kNoGround;
         float* distance = &ground.distance[b * kVoxels];
         float* above = &ground.above[b * kVoxels];
         // A block beyond the terrain's rim may still have voxels within it: only a distance that is known tells.
@@ -88,7 +87,7 @@ GroundField sample_ground(const LevelSet::Impl& s, const geometry::Terrain& terr
           }
           return;
         }
-        const GroundLattice lattice = lattice_of(s, terrain, b, search);
+        const GroundLattice lattice = lattice_of(c, origin, voxel, terrain, search);
         for (int i = 0; i < kSide; ++i)
           for (int j = 0; j < kSide; ++j)
             for (int k = 0; k < kSide; ++k) {
@@ -105,26 +104,25 @@ GroundField sample_ground(const LevelSet::Impl& s, const geometry::Terrain& terr
   return ground;
 }
 
-void lift_to_ground(const LevelSet::Impl& s, const GroundField& ground, float depth, Field& phi) {
+void lift_to_ground(const Blocks& blocks, float outside, float lift, const GroundField& ground, float depth, const Field& old, Field& phi) {
   ZONE("skin.lift");
-  const Field& old = s.phi;
   phi.resize(old.size());
   parallel_for(
-      s.blocks.size(),
+      blocks.size(),
       [&](std::size_t b) {
-        const BlockCoord& c = s.blocks.coords()[b];
+        const BlockCoord& c = blocks.coords()[b];
         for (std::size_t v = 0; v < kVoxels; ++v) {
           const std::size_t at = b * kVoxels + v;
           const float g = ground.distance[at];
           phi[at] = old[at];
-          if (g >= 2 * s.lift || g < -depth) continue;
+          if (g >= 2 * lift || g < -depth) continue;
           const Vec3 p(kSide * c[0] + static_cast<int>(v >> 6), kSide * c[1] + static_cast<int>((v >> 3) & 7),
                        kSide * c[2] + static_cast<int>(v & 7));
           const Vec3 normal = ground.normal[at].cast<Real>();
-          for (const float height : {s.lift, 1.5f * s.lift, 2 * s.lift}) {
+          for (const float height : {lift, 1.5f * lift, 2 * lift}) {
             const float value =
-                height <= g ? old[at] : s.blocks.sample(old, s.outside, static_cast<Index>(b), p + static_cast<Real>(height - g) * normal);
-            phi[at] = height == s.lift ? value : std::min(phi[at], value);
+                height <= g ? old[at] : blocks.sample(old, outside, static_cast<Index>(b), p + static_cast<Real>(height - g) * normal);
+            phi[at] = height == lift ? value : std::min(phi[at], value);
           }
         }
       },

@@ -206,9 +206,45 @@ bool widen(const Blocks& blocks, float outside, const Field& phi, const std::vec
   return true;
 }
 
+/// Where each block whose mesh is still good lies in `last`; kNone: to be made. edges: whose quads are to be made.
+std::vector<Index> still_good(const Blocks& blocks, float outside, const Field& phi, const MeshCache& last, std::vector<std::uint8_t>& edges) {
+  std::vector<Index> before(blocks.size(), kNone);
+  edges.assign(blocks.size(), 1);
+  if (last.meshed.empty() || last.outside != outside) return before;
+  std::vector<std::uint8_t> same(blocks.size(), 0);
+  parallel_for(
+      blocks.size(),
+      [&](std::size_t b) {
+        const BlockCoord& c = blocks.coords()[b];
+        before[b] = last.blocks.block_at(Vec3(kSide * c[0], kSide * c[1], kSide * c[2]));
+        same[b] = before[b] != kNone && std::memcmp(&phi[b * kVoxels], &last.phi[before[b] * kVoxels], kVoxels * sizeof(float)) == 0;
+      },
+      256);
+  std::vector<Index> good(blocks.size(), kNone);
+  parallel_for(
+      blocks.size(),
+      [&](std::size_t b) {
+        if (!same[b]) return;
+        for (std::size_t slot = 0; slot < 27; ++slot) {
+          const Index now = blocks.around(b)[slot], then = last.blocks.around(before[b])[slot];
+          if (now == kNone ? then != kNone : !same[now]) return;
+        }
+        good[b] = before[b];
+      },
+      256);
+  parallel_for(
+      blocks.size(),
+      [&](std::size_t b) {
+        const auto& around = blocks.around(b);
+        edges[b] = std::any_of(around.begin(), around.end(), [&](Index k) { return k != kNone && good[k] == kNone; });
+      },
+      256);
+  return good;
+}
+
 }  // namespace
 
-geometry::TriMesh iso_mesh(const Blocks& blocks, float outside, const Field& phi) {
+geometry::TriMesh iso_mesh(const Blocks& blocks, float outside, const Field& phi, MeshCache* last) {
   ZONE("skin.iso_mesh");
   CHECK_GE(outside, 0.0f);
   CHECK_EQ(phi.size(), blocks.size() * kVoxels);
@@ -225,13 +261,21 @@ geometry::TriMesh iso_mesh(const Blocks& blocks, float outside, const Field& phi
       64);
   Blocks wider;
   Field values;
-  if (widen(blocks, outside, phi, side, wider, values)) return iso_mesh(wider, outside, values);
+  if (widen(blocks, outside, phi, side, wider, values)) return iso_mesh(wider, outside, values, last);
 
   std::vector<MeshedBlock> meshed(blocks.size());
+  std::vector<std::uint8_t> edges(blocks.size(), 1);
+  const std::vector<Index> good = last ? still_good(blocks, outside, phi, *last, edges) : std::vector<Index>(blocks.size(), kNone);
   parallel_for(
-      blocks.size(), [&](std::size_t b) { if (is_crossed(blocks, b, side)) mesh_cells(Padded(blocks, outside, phi, b), meshed[b]); }, 16);
+      blocks.size(),
+      [&](std::size_t b) {
+        if (good[b] != kNone) meshed[b] = std::move(last->meshed[good[b]]);
+        else if (is_crossed(blocks, b, side)) mesh_cells(Padded(blocks, outside, phi, b), meshed[b]);
+        if (edges[b]) meshed[b].quads.clear();
+      },
+      16);
   parallel_for(
-      blocks.size(), [&](std::size_t b) { if (!meshed[b].empty()) mesh_edges(blocks, b, meshed); }, 16);
+      blocks.size(), [&](std::size_t b) { if (edges[b] && !meshed[b].empty()) mesh_edges(blocks, b, meshed); }, 16);
 
   std::vector<Index> vertices(blocks.size() + 1, 0), quads(blocks.size() + 1, 0);
   for (std::size_t b = 0; b < blocks.size(); ++b) {
@@ -267,6 +311,7 @@ geometry::TriMesh iso_mesh(const Blocks& blocks, float outside, const Field& phi
         }
       },
       64);
+  if (last) *last = {blocks, outside, phi, std::move(meshed)};
   return mesh;
 }
 

@@ -24,6 +24,14 @@ struct MeshedBlock {
   bool empty() const { return position.empty(); }
 };
 
+/// The last mesh made, block by block.
+struct MeshCache {
+  Blocks blocks;
+  float outside = 0;
+  Field phi;
+  std::vector<MeshedBlock> meshed;
+};
+
 /// The zero level of phi as triangles with normals: dual, with one vertex for each patch of the surface in each cell that it crosses,
 /// in the middle of the patch's crossings, and two triangles for each crossed edge, split along the shorter diagonal. Counter-
 /// clockwise from outside. Closed, oriented and manifold for every phi: patches that share a cell have vertices of their own,
@@ -32,8 +40,9 @@ struct MeshedBlock {
 /// Normals: central differences of phi, trilinear between voxels; where those point against the crossings (places thinner than
 /// two voxels), the cell's own gradient.
 ///   outside  value where there are no blocks, >= 0 (checked)
+///   last     blocks of the same values in the same surroundings are taken from it, and the mesh is left in it
 /// Positions in voxels from the origin. Same bits on any number of threads. 60 ns a triangle and thread.
 /// Source: Nielson 2004, Dual marching cubes; Wenger 2013, Isosurfaces, ch. 5 (the faces).
-geometry::TriMesh iso_mesh(const Blocks& blocks, float outside, const Field& phi);
+geometry::TriMesh iso_mesh(const Blocks& blocks, float outside, const Field& phi, MeshCache* last = nullptr);
 
 }  // namespace effuse::skin

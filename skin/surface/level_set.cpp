@@ -8,6 +8,7 @@
 #include "geometry/base/zones.h"
 #include "skin/surface/level_set_impl.h"
 #include "skin/surface/rasterize.h"
+#include "skin/surface/surface_cache.h"
 
 namespace effuse::skin {
 
@@ -24,7 +25,78 @@ std::size_t LevelSet::active_voxels() const {
   return static_cast<std::size_t>(std::count_if(impl_->phi.begin(), impl_->phi.end(), [](float v) { return std::abs(v) < 2; }));
 }
 
-LevelSet build_level_set(const geometry::Points& points, Real volume, const geometry::Terrain* terrain, const LevelSetOptions& options) {
+namespace {
+
+/// What the field is made with; lengths in voxels.
+struct Making {
+  RasterOptions raster;
+  float smoothing = 0;       // time of the flow
+  float lone = 0, sheet = 0;  // W at the surface of a lone particle, of a plane sheet
+  float sink = 0;
+  const geometry::Terrain* terrain = nullptr;
+  float depth() const { return sink + 2; }  // voxels deeper than this are outside, whatever they were
+};
+
+/// The field before its shift, on some of the blocks; ground: out.
+Field make_field(const LevelSet::Impl& s, const Blocks& blocks, const Making& making, GroundField& ground) {
+  Field phi, weight;
+  rasterize(s.particles, blocks, making.raster, phi, weight);
+  smooth(blocks, s.outside, making.smoothing, weight, making.lone, making.sheet, phi);
+  if (!making.terrain) return phi;
+  ground = sample_ground(blocks, s.particles.origin(), s.voxel, *making.terrain, std::max(2 * s.lift, making.depth()) + 1);
+  Field lifted;
+  lift_to_ground(blocks, s.outside, s.lift, ground, making.depth(), phi, lifted);
+  return lifted;
+}
+
+/// The same on all blocks, from the last frame where nothing has changed. stale: out, the blocks that were made anew.
+Field renew_field(const LevelSet::Impl& s, const Making& making, SurfaceCache::Impl& last, const std::vector<std::uint64_t>& hash, GroundField& ground, Renewal& renewal) {
+  // How far a value feels a particle, and what it needs of the values around it: sums between nodes, a voxel a step, the lift.
+  const int steps = smoothing_steps(making.smoothing);
+  const float nodes = making.raster.reach >= kFineReach ? 4 : 0, lift = making.terrain ? 2 * s.lift + 2 : 0;
+  const float beyond = static_cast<float>(steps) + lift;
+  renewal = find_stale(last, s.particles, hash, s.blocks, static_cast<Real>(s.reach + nodes + beyond));
+  const std::vector<std::uint8_t> needed = widened(s.blocks, renewal.stale, static_cast<int>(std::ceil(beyond / kSide)) + (nodes > 0 ? 1 : 0));
+  std::vector<BlockCoord> coords;
+  for (std::size_t b = 0; b < s.blocks.size(); ++b)
+    if (needed[b]) coords.push_back(s.blocks.coords()[b]);
+  if (coords.size() > s.blocks.size() * 2 / 3) {
+    std::fill(renewal.stale.begin(), renewal.stale.end(), std::uint8_t{1});
+    renewal.stale_blocks = s.blocks.size();
+    return make_field(s, s.blocks, making, ground);
+  }
+  const Blocks part(std::move(coords));
+  GroundField part_ground;
+  const Field made = make_field(s, part, making, part_ground);
+
+  Field field(s.blocks.size() * kVoxels);
+  if (making.terrain) ground.distance.resize(field.size()), ground.above.resize(field.size());
+  parallel_for(
+      s.blocks.size(),
+      [&](std::size_t b) {
+        const BlockCoord& c = s.blocks.coords()[b];
+        const std::size_t from = kVoxels * (renewal.stale[b] ? part.block_at(Vec3(kSide * c[0], kSide * c[1], kSide * c[2])) : renewal.before[b]);
+        const auto take = [&](const Field& anew, const Field& old, Field& to) { std::copy_n(&(renewal.stale[b] ? anew : old)[from], kVoxels, &to[b * kVoxels]); };
+        take(made, last.lifted, field);
+        if (!making.terrain) return;
+        take(part_ground.distance, last.distance, ground.distance);
+        take(part_ground.above, last.above, ground.above);
+      },
+      64);
+  return field;
+}
+
+/// Whether values of the last frame can be used at all.
+bool fits(const SurfaceCache::Impl& last, const LevelSetOptions& o, const geometry::Terrain* terrain, const Vec3& origin) {
+  const LevelSetOptions& p = last.options;
+  return last.filled && last.terrain == terrain && last.origin == origin && p.spacing == o.spacing && p.voxel == o.voxel && p.influence == o.influence &&
+         p.radius == o.radius && p.smoothing == o.smoothing && p.sink == o.sink;
+}
+
+}  // namespace
+
+LevelSet build_level_set(const geometry::Points& points, Real volume, const geometry::Terrain* terrain, const LevelSetOptions& options,
+                         SurfaceCache* last) {
   ZONE("skin.level_set");
   CHECK(options.spacing > 0 && std::isfinite(options.spacing));
   CHECK_GE(options.voxel, 0.0);
@@ -42,35 +114,51 @@ LevelSet build_level_set(const geometry::Points& points, Real volume, const geom
   s.lift = d / 2;  // the lowest particles float so high over the ground
   s.report.particles = points.size();
   s.particles = ParticleGrid(points, s.voxel, std::max(1.0, s.reach / 2.0));
-  if (points.size() == 0) return surface;
+  if (points.size() == 0) {
+    if (last) *last = SurfaceCache();
+    return surface;
+  }
 
   // The dual mesh rounds the edge where side and bottom meet: a voxel and a half keeps that under the ground. Blocks must
   // reach beyond the particles' own reach to hold the bottom.
   const float sink = options.sink > 0 ? static_cast<float>(options.sink / s.voxel) : 1.5f;
   s.blocks = blocks_around(s.particles, s.reach + (terrain ? sink + 1 : 0));
-  RasterOptions raster{.reach = s.reach, .spacing = d, .radius_factor = 2 * static_cast<float>(options.radius), .outside = s.outside};
-  Field weight;
-  rasterize(s.particles, s.blocks, raster, s.phi, weight);
-
+  if (terrain) s.terrain = *terrain;
   const float near_surface = 1 - (radius / s.reach) * (radius / s.reach);
-  const float lone = near_surface * near_surface * near_surface;
-  const float sheet = static_cast<float>(kPi) / 4 * (s.reach / d) * (s.reach / d) * lone * near_surface;
-  smooth(s.blocks, s.outside, static_cast<float>(options.smoothing) * d * d / 24, weight, lone, sheet, s.phi);
+  Making making{.raster = {.reach = s.reach, .spacing = d, .radius_factor = 2 * static_cast<float>(options.radius), .outside = s.outside},
+                .smoothing = static_cast<float>(options.smoothing) * d * d / 24,
+                .lone = near_surface * near_surface * near_surface,
+                .sink = sink,
+                .terrain = terrain};
+  making.sheet = static_cast<float>(kPi) / 4 * (s.reach / d) * (s.reach / d) * making.lone * near_surface;
 
   GroundField ground;
-  if (terrain) {
-    s.terrain = *terrain;
-    const float depth = sink + 2;  // voxels deeper than this are outside, whatever they were
-    ground = sample_ground(s, *terrain, std::max(2 * s.lift, depth) + 1);
-    Field lifted;
-    lift_to_ground(s, ground, depth, lifted);
-    s.phi.swap(lifted);
+  Renewal renewal;
+  std::vector<std::uint64_t> hash;
+  KnownVolumes known;
+  if (last) hash = particle_hashes(s.particles);
+  if (last && fits(last->impl(), options, terrain, s.particles.origin())) {
+    s.phi = renew_field(s, making, last->impl(), hash, ground, renewal);
+    renewal.stale = widened(s.blocks, std::move(renewal.stale), 1);  // cells reach into the next block
+    // A block that is gone leaves `outside` behind.
+    for (std::size_t b = 0; b < s.blocks.size(); ++b)
+      for (std::size_t slot = 0; slot < 27 && !renewal.stale[b]; ++slot)
+        renewal.stale[b] = s.blocks.around(b)[slot] == kNone && last->impl().blocks.around(renewal.before[b])[slot] != kNone;
+    known.last = &last->impl().volumes;
+    known.before = renewal.before;
+    known.stale = renewal.stale;
+  } else {
+    s.phi = make_field(s, s.blocks, making, ground);
   }
+  s.report.blocks = s.blocks.size();
+  s.report.renewed = known.last ? renewal.stale_blocks : s.blocks.size();
+  Field lifted;
+  if (last) lifted = s.phi;
 
   const auto voxels = [&](Real v) { return v / (s.voxel * s.voxel * s.voxel); };
   if (options.match_volume && volume > 0) {
     s.report.target = volume;
-    const float shift = matching_shift(s.blocks, s.outside, s.phi, ground.above, voxels(volume), d / 2);
+    const float shift = matching_shift(s.blocks, s.outside, s.phi, ground.above, voxels(volume), d / 2, known);
     s.report.shift = static_cast<Real>(shift) * s.voxel;
     parallel_for(
         s.phi.size(), [&](std::size_t i) { s.phi[i] -= shift; }, 1 << 14);
@@ -83,6 +171,20 @@ LevelSet build_level_set(const geometry::Points& points, Real volume, const geom
           if (ground.distance[i] < kNoGround) s.phi[i] = std::min(s.outside, std::max(s.phi[i], -ground.distance[i] - sink));
         },
         1 << 14);
+  if (last) {
+    SurfaceCache::Impl& c = last->impl();
+    c.filled = true;
+    c.options = options;
+    c.terrain = terrain;
+    c.origin = s.particles.origin();
+    c.blocks = s.blocks;
+    c.x = s.particles.x();
+    c.hash = std::move(hash);
+    c.lifted = std::move(lifted);
+    c.distance = ground.distance;
+    c.above = ground.above;
+    c.volumes = std::move(known.now);
+  }
   drop_pieces(s.blocks, s.particles, options.drop_volume * std::pow(static_cast<Real>(d), 3), s.phi, s.report);
 
   s.report.volume = enclosed(s.blocks, s.outside, s.phi, ground.above, 0) * std::pow(s.voxel, 3);

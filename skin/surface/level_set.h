@@ -30,6 +30,7 @@ struct LevelSetReport {
   Real target = 0;               ///< [m^3] what it was to be; 0: nothing asked for
   Real shift = 0;                ///< [m] by which the surface was moved out, within +-0.5 spacing
   Real residual = 0;             ///< volume / target - 1; 0 without target. Not small: the bound of the shift stood in the way
+  std::size_t blocks = 0, renewed = 0;  ///< blocks of 8^3 voxels, and how many of them were computed, not taken from the last frame
   std::size_t dropped_webs = 0;  ///< pieces of the field that held no particle
   std::size_t dropped_pieces = 0, filled_bubbles = 0;  ///< by drop_volume
 };
@@ -55,6 +56,21 @@ class LevelSet {
   std::unique_ptr<Impl> impl_;
 };
 
+/// What a frame's surface leaves for the next frame's. Opaque. A film goes through one, frame by frame.
+class SurfaceCache {
+ public:
+  SurfaceCache();
+  ~SurfaceCache();
+  SurfaceCache(SurfaceCache&&) noexcept;
+  SurfaceCache& operator=(SurfaceCache&&) noexcept;
+
+  struct Impl;
+  Impl& impl() { return *impl_; }
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
 /// Level set round the points (Zhu & Bridson 2005): phi(x) = |x - xbar| - rbar, xbar and rbar averages of the
 /// particles' positions and radii with weights (1 - (|x - x_i|/R)^2)^3, R = influence * spacing. Three repairs: between
 /// particles that do not touch the average lies in empty space, so phi >= 3 (d - 1.15 spacing), d the distance of the
@@ -73,13 +89,16 @@ class LevelSet {
 /// Throws InputError for positions or radii that are not finite, a radius <= 0, or particles so far apart that the voxels
 /// cannot be numbered (a million in a row).
 /// Source: Zhu & Bridson 2005, ACM Trans. Graph. 24, 965-972.
-LevelSet build_level_set(const geometry::Points& points, Real volume, const geometry::Terrain* terrain, const LevelSetOptions& options);
+///   last  values are taken from it where no particle has moved, come or gone nearby, and it is left for the next frame. The result is
+///         the same, to the bit. The terrain must be the one of the frames before, at the same address and unchanged
+LevelSet build_level_set(const geometry::Points& points, Real volume, const geometry::Terrain* terrain, const LevelSetOptions& options,
+                         SurfaceCache* last = nullptr);
 
-/// Watertight triangles of the zero level (OpenVDB volumeToMesh, winding put right), closed, oriented and
-/// manifold: where pieces touch in an edge or a point, each gets vertices of its own. Attributes "temperature",
+/// Watertight triangles of the zero level (iso_mesh.h): closed, oriented and manifold. Attributes "temperature",
 /// "velocity", "crust" and, when the points had them, "age", "rest", "rest2" (width 3), by the surface's weights
 /// at the vertices; normals from the gradient.
-geometry::TriMesh mesh_level_set(const LevelSet& surface);
+///   last  as for build_level_set, whose cache of the same frame it is
+geometry::TriMesh mesh_level_set(const LevelSet& surface, SurfaceCache* last = nullptr);
 
 /// Volume between the surface and the ground above it [m^3] (below-ground part left out).
 Real volume_above_ground(const LevelSet& surface, const geometry::Terrain* terrain);

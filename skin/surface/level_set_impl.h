@@ -1,6 +1,9 @@
 #pragma once
 
+#include <map>
 #include <optional>
+#include <span>
+#include <vector>
 
 #include "skin/surface/blocks.h"
 #include "skin/surface/level_set.h"
@@ -34,15 +37,25 @@ inline constexpr float kNoGround = 1e9f;
 
 /// Ground distances at every second voxel from the terrain, trilinear between; blocks farther from the ground
 /// than `reach` are kNoGround above it and -kNoGround below.
-GroundField sample_ground(const LevelSet::Impl& s, const geometry::Terrain& terrain, float reach);
+GroundField sample_ground(const Blocks& blocks, const Vec3& origin, Real voxel, const geometry::Terrain& terrain, float reach);
 
-/// phi out: s.phi, but each voxel at height g < 2 lift has the least value along the ground's normal at max(g, lift),
+/// phi out: old, but each voxel at height g < 2 lift has the least value along the ground's normal at max(g, lift),
 /// max(g, 1.5 lift), max(g, 2 lift); continuous. Voxels deeper than `depth` are left as they are.
-void lift_to_ground(const LevelSet::Impl& s, const GroundField& ground, float depth, Field& phi);
+void lift_to_ground(const Blocks& blocks, float outside, float lift, const GroundField& ground, float depth, const Field& old, Field& phi);
 
 /// Mean-curvature flow phi_t = kappa |grad phi| for a time [voxels^2], in explicit steps; where W (rasterize.h) is like a
 /// lone particle's nothing moves. lone, sheet: W at the surface of a lone particle and of a plane sheet.
+/// A voxel feels what lies within so many voxels as there are steps.
+int smoothing_steps(float time);
 void smooth(const Blocks& blocks, float outside, float time, const Field& weight, float lone, float sheet, Field& phi);
+
+/// Volumes of blocks that the last frame knows, by shift in steps: out, those of this frame.
+struct KnownVolumes {
+  const std::map<int, std::vector<Real>>* last = nullptr;
+  std::span<const Index> before;         ///< of each block, among the last frame's
+  std::span<const std::uint8_t> stale;   ///< or a cell of it reaches into a block that is
+  std::map<int, std::vector<Real>> now;
+};
 
 /// Volume [voxels] where phi < shift and above ground, phi linear in six tetrahedra a cell: what a mesh through the
 /// same crossings encloses. above: GroundField::above, or empty.
@@ -50,7 +63,7 @@ Real enclosed(const Blocks& blocks, float outside, const Field& phi, const Field
 /// The shift within +-most, in steps of 1 / kShiftSteps, at which enclosed() is the target as nearly as such steps allow; the nearer
 /// end when there is none.
 inline constexpr int kShiftSteps = 128;
-float matching_shift(const Blocks& blocks, float outside, const Field& phi, const Field& above, Real target, float most);
+float matching_shift(const Blocks& blocks, float outside, const Field& phi, const Field& above, Real target, float most, KnownVolumes& known);
 
 /// Turns inner voxels into outer ones where a face-connected set of them holds no particle (webs between particles) or is
 /// smaller than `least` [voxels], and closed bubbles smaller than that into inner ones.

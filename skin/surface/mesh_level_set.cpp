@@ -4,6 +4,7 @@
 #include "geometry/base/zones.h"
 #include "skin/surface/iso_mesh.h"
 #include "skin/surface/level_set_impl.h"
+#include "skin/surface/surface_cache.h"
 
 namespace effuse::skin {
 
@@ -32,10 +33,10 @@ void carry_attributes(const LevelSet::Impl& s, const std::vector<Vec3>& at, geom
 
 }  // namespace
 
-geometry::TriMesh mesh_level_set(const LevelSet& surface) {
+geometry::TriMesh mesh_level_set(const LevelSet& surface, SurfaceCache* last) {
   ZONE("skin.mesh");
   const LevelSet::Impl& s = surface.impl();
-  geometry::TriMesh mesh = iso_mesh(s.blocks, s.outside, s.phi);
+  geometry::TriMesh mesh = iso_mesh(s.blocks, s.outside, s.phi, last ? &last->impl().mesh : nullptr);
   const std::vector<Vec3> at = mesh.positions;
   for (Vec3& p : mesh.positions) p = s.world(p);
   carry_attributes(s, at, mesh);

@@ -42,7 +42,7 @@ ParticleGrid::ParticleGrid(const geometry::Points& points, Real voxel, Real side
 
   Box3 box;
   for (const Vec3& p : points.position) box.extend(p);
-  const Real block = 8 * voxel;
+  const Real block = 512 * voxel;
   origin_ = block * (box.center() / block).array().round().matrix();
 
   // Columns in the order of their first particle, their particles counted, then placed.

@@ -19,7 +19,7 @@ class ParticleGrid {
   ParticleGrid(const geometry::Points& points, Real voxel, Real side);
 
   std::size_t size() const { return x_.size(); }
-  /// A multiple of 8 voxels [m], near the particles' middle: floats count from here, and frames share one lattice.
+  /// A multiple of 512 voxels [m], near the particles' middle: frames share one lattice, and most of them one origin.
   const Vec3& origin() const { return origin_; }
   const std::vector<Vec3>& x() const { return x_; }             ///< sorted [voxels]
   const std::vector<float>& radius() const { return radius_; }  ///< sorted [voxels]

@@ -99,8 +99,6 @@ EFFUSE_CLONES void gather_block(const Candidates& near, Narrowed& slab, Narrowed
 
 constexpr int kNodes = kSide / 2;  // along a block's side
 constexpr std::size_t kBlockNodes = kNodes * kNodes * kNodes;
-/// Nodes are no farther apart than a quarter of the reach: cubic interpolation of the sums is right to 1e-3 of them.
-constexpr float kFineReach = 8;
 /// A point this near to a particle [spacings] is in lava or beside it: holes of dense packings are 0.87 wide.
 constexpr float kCovered = 1;
 

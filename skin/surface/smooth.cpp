@@ -54,10 +54,14 @@ EFFUSE_CLONES void flow_step(const float* padded, const float* rate, float* out)
 
 }  // namespace
 
+int smoothing_steps(float time) {
+  constexpr float kLongestStep = 0.225f;  // stable below 1/4 (the flow diffuses in the two tangential directions)
+  return static_cast<int>(std::ceil(time / kLongestStep - 1e-4f));
+}
+
 void smooth(const Blocks& blocks, float outside, float time, const Field& weight, float lone, float sheet, Field& phi) {
   ZONE("skin.smooth");
-  constexpr float kLongestStep = 0.225f;  // stable below 1/4 (the flow diffuses in the two tangential directions)
-  const int steps = static_cast<int>(std::ceil(time / kLongestStep - 1e-4f));
+  const int steps = smoothing_steps(time);
   const float dt = steps > 0 ? time / static_cast<float>(steps) : 0;
   const float from = 1.2f * lone, to = std::max(1.5f * lone, 0.75f * sheet);
 

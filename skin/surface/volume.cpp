@@ -65,6 +65,18 @@ class Enclosed {
     return parallel_sum(
         blocks_.size(), Real{0}, [&](std::size_t b) { return of_block(b, shift); }, 32);
   }
+  /// At a shift in steps; blocks that the last frame knows are not looked at.
+  Real operator()(int steps, KnownVolumes& known) {
+    const std::vector<Real>* last = nullptr;
+    if (known.last)
+      if (const auto at = known.last->find(steps); at != known.last->end()) last = &at->second;
+    std::vector<Real>& now = known.now[steps];
+    now.resize(blocks_.size());
+    const float shift = static_cast<float>(steps) / kShiftSteps;
+    return parallel_sum(
+        blocks_.size(), Real{0},
+        [&](std::size_t b) { return now[b] = last && !known.stale[b] ? (*last)[known.before[b]] : of_block(b, shift); }, 32);
+  }
 
  private:
   struct Range {
@@ -117,11 +129,11 @@ Real enclosed(const Blocks& blocks, float outside, const Field& phi, const Field
   return Enclosed(blocks, outside, phi, above)(shift);
 }
 
-float matching_shift(const Blocks& blocks, float outside, const Field& phi, const Field& above, Real target, float most) {
+float matching_shift(const Blocks& blocks, float outside, const Field& phi, const Field& above, Real target, float most, KnownVolumes& known) {
   ZONE("skin.match_volume");
   Enclosed volume(blocks, outside, phi, above);
   // In whole steps, so that a frame of which little has changed is shifted as the one before.
-  const auto excess = [&](int k) { return volume(static_cast<float>(k) / kShiftSteps) / target - 1; };
+  const auto excess = [&](int k) { return volume(k, known) / target - 1; };
   const int end = static_cast<int>(most * kShiftSteps);
   // Out from zero by steps that double until the target lies between (a first one usually does), then regula falsi with
   // the weight of an end that stays halved (Illinois): the volume rises with the shift, but may jump (pieces, thin sheets).
@@ -168,7 +180,7 @@ float matching_shift(const Blocks& blocks, float outside, const Field& phi, cons
 Real volume_above_ground(const LevelSet& surface, const geometry::Terrain* terrain) {
   if (surface.empty()) return 0;
   const LevelSet::Impl& s = surface.impl();
-  const Field above = terrain ? sample_ground(s, *terrain, 2).above : Field{};
+  const Field above = terrain ? sample_ground(s.blocks, s.particles.origin(), s.voxel, *terrain, 2).above : Field{};
   return enclosed(s.blocks, s.outside, s.phi, above, 0) * s.voxel * s.voxel * s.voxel;
 }
 

@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <thread>
 
@@ -279,7 +280,13 @@ TEST_F(ProgramTest, KeepsARunUnlessForcedAndARunOfAnotherSceneFromBeingResumed) 
   EXPECT_NE(other.err.find("scene has changed"), std::string::npos) << other.err;
   EXPECT_EQ(effuse(run_gully(out, 5, {"--resume"})).code, 0) << "more frames are no other scene";
   EXPECT_EQ(run_json(out).at("frames").size(), 5u);
+  const fs::path mine = out / "frames" / "notes.txt", cut = out / "frames" / "skin.0009.part.ply";
+  std::ofstream(mine) << "of the user\n";
+  std::ofstream(cut) << "half\n";
   EXPECT_EQ(effuse(run_gully(out, 2, {"--force"})).code, 0);
+  EXPECT_TRUE(fs::exists(mine)) << "a file of somebody else";
+  EXPECT_FALSE(fs::exists(cut));
+  fs::remove(mine);
   EXPECT_EQ(frame_files(out).size(), 2u * 4);
 }
 

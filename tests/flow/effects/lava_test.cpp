@@ -69,6 +69,20 @@ TEST(ReadLava, IsModernUnlessClassicIsAskedFor) {
   EXPECT_EQ(resolved_text(classic.resolved, "lava.heat.on"), "");
 }
 
+TEST(ReadLava, RefusesVentsThatAreOpenAtOneTimeInOnePlace) {
+  const auto second = [](const char* at, const char* start) {
+    return read({{"lava.vent[1].at", at}, {"lava.vent[1].width", "1 m"}, {"lava.vent[1].rate", "2 m3/s"}, {"lava.vent[1].start", start}, {"lava.vent[0].stop", "60 s"}}).faults;
+  };
+  EXPECT_TRUE(contains(second("[6.5, 5]", "0 s"), "vents 1 and 2 are open at one time and 1.5 m apart, wanted 2 m")) << second("[6.5, 5]", "0 s");
+  EXPECT_EQ(second("[7.1, 5]", "0 s"), "");
+  EXPECT_EQ(second("[6.5, 5]", "60 s"), "") << "one after the other";
+  // Fissures that cross.
+  const std::string crossing = read({{"lava.vent[1].from", "[4, 0]"}, {"lava.vent[1].to", "[4, 20]"}, {"lava.vent[1].width", "1 m"}, {"lava.vent[1].rate", "1 m3/s"},
+                                     {"lava.vent[2].from", "[-9, 15]"}, {"lava.vent[2].to", "[9, 15]"}, {"lava.vent[2].width", "1 m"}, {"lava.vent[2].rate", "1 m3/s"}})
+                                   .faults;
+  EXPECT_TRUE(contains(crossing, "vents 2 and 3 are open at one time and 0 m apart")) << crossing;
+}
+
 TEST(ReadLava, APresetBringsDensityHeatRheologyAndTheVentsTemperature) {
   for (const sph::LavaPreset& preset : sph::lava_presets()) {
     const Read r = read({{"lava.preset", std::string(preset.name)}});

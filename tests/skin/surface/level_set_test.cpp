@@ -9,6 +9,7 @@
 #include "geometry/base/parallel.h"
 #include "geometry/mesh/measure.h"
 #include "geometry/mesh/validate.h"
+#include "skin/surface/level_set_impl.h"
 #include "tests/skin/surface/shapes.h"
 
 namespace effuse::skin {
@@ -379,6 +380,70 @@ TEST(LevelSet, ParticlesOverTheTerrainsRimGiveASolidMesh) {
   const geometry::MeshReport report =
       geometry::validate(mesh_level_set(build_level_set(cloud.points(), cloud.volume(), &ground, at_spacing(1))));
   EXPECT_TRUE(report.solid()) << geometry::to_string(report);
+}
+
+/// Waves of half a spacing under z = 0.
+geometry::Terrain rolling_ground() {
+  std::vector<Real> z;
+  for (int j = 0; j < 60; ++j)
+    for (int i = 0; i < 60; ++i) z.push_back(0.25 * (std::sin(0.7 * i) * std::sin(0.9 * j) - 1));
+  return geometry::Terrain::from_height_field(geometry::HeightField(Vec2(-20, -20), Vec2(1, 1), 60, 60, z));
+}
+
+struct CacheCase {
+  const char* name;
+  Real voxel;
+  bool ground;
+};
+class SurfaceCached : public testing::TestWithParam<CacheCase> {};
+
+// A film in which a little changes, nothing, some comes and goes far out, all moves: each frame as without a cache, to the bit.
+TEST_P(SurfaceCached, IsTheSameSurfaceToTheBit) {
+  const geometry::Terrain terrain = rolling_ground();
+  LevelSetOptions options;
+  options.spacing = 1;
+  options.voxel = GetParam().voxel;
+  Cloud cloud = fill(Box3(Vec3(-14, -14, 0), Vec3(14, 14, 3)), 1, [](const Vec3&) { return true; }, 0.15);
+  SurfaceCache cache;
+  std::size_t least = ~std::size_t{0};
+  for (int frame = 0; frame < 8; ++frame) {
+    if (frame == 1 || frame == 4)
+      for (Vec3& x : cloud.x)
+        if (x.x() > 10 && x.y() > 9) x += Vec3(0.1, -0.05, 0.02 * frame);
+    if (frame == 3)
+      for (int i = 0; i < 20; ++i) cloud.add(Vec3(-19 + 0.3 * i, -17, 1 + 0.2 * i), 1);  // new blocks
+    if (frame == 5)
+      for (int i = 0; i < 20; ++i) cloud.x[cloud.x.size() - 1 - static_cast<std::size_t>(i)].z() += 6;  // blocks gone
+    if (frame == 6)
+      for (Vec3& x : cloud.x) x += Vec3(0.3, 0, 0.1);
+    const geometry::Terrain* under = GetParam().ground ? &terrain : nullptr;
+    const LevelSet kept = build_level_set(cloud.points(), cloud.volume(), under, options, &cache), fresh = build_level_set(cloud.points(), cloud.volume(), under, options);
+    ASSERT_EQ(kept.impl().phi, fresh.impl().phi) << "frame " << frame;
+    ASSERT_EQ(kept.report().volume, fresh.report().volume);
+    const geometry::TriMesh a = mesh_level_set(kept, &cache), b = mesh_level_set(fresh);
+    ASSERT_EQ(a.positions, b.positions);
+    ASSERT_EQ(a.triangles, b.triangles);
+    ASSERT_EQ(a.normals, b.normals);
+    EXPECT_EQ(fresh.report().renewed, fresh.report().blocks);
+    if (frame > 0 && frame < 6) least = std::min(least, kept.report().renewed);
+    if (frame == 2 || frame == 7) EXPECT_EQ(kept.report().renewed, 0u) << "nothing has moved";
+    if (frame == 1) EXPECT_LT(kept.report().renewed, kept.report().blocks / (GetParam().voxel < 0.4 ? 2 : 1));
+  }
+}
+INSTANTIATE_TEST_SUITE_P(All, SurfaceCached, testing::Values(CacheCase{"coarse", 0.5, false}, CacheCase{"coarse_on_ground", 0.5, true}, CacheCase{"fine", 0.25, false}, CacheCase{"fine_on_ground", 0.25, true}),
+                         [](const auto& test) { return std::string(test.param.name); });
+
+TEST(SurfaceCache, OfOtherOptionsOrEmptyFramesIsNotUsed) {
+  Cloud cloud = fill(cube(4), 1, [](const Vec3&) { return true; });
+  LevelSetOptions options;
+  options.spacing = 1;
+  SurfaceCache cache;
+  build_level_set(cloud.bare(), cloud.volume(), nullptr, options, &cache);
+  options.smoothing = 5;
+  EXPECT_EQ(build_level_set(cloud.bare(), cloud.volume(), nullptr, options, &cache).impl().phi, build_level_set(cloud.bare(), cloud.volume(), nullptr, options).impl().phi);
+  EXPECT_TRUE(build_level_set({}, 0, nullptr, options, &cache).empty());
+  const LevelSetReport report = build_level_set(cloud.bare(), cloud.volume(), nullptr, options, &cache).report();
+  EXPECT_EQ(report.renewed, report.blocks);
 }
 
 }  // namespace
