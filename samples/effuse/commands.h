@@ -49,6 +49,9 @@ struct SkinCommand {
   std::optional<bool> match_volume;              ///< enclose the particles' volume; absent: if a radius is known and no threshold given
   int mesh_smoothing_iters = 2;                  ///< passes of mean-curvature flow on the level set
   double drop_volume = 0;                        ///< pieces and bubbles of fewer particles are left out
+  std::string tessellation = "levelset";         ///< or "voronoi"
+  double coarsen = 0;                            ///< in particle spacings, 2 radii; 0: not
+  std::filesystem::path terrain;                 ///< where the skin ends, in the particles' coordinates; empty: none
   bool sph_normals = true;                       ///< from the field's gradient; else of the triangles
   bool check = false;
   std::string up = "z";                          ///< of the particles: "y" or "z"

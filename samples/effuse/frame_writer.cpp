@@ -7,9 +7,9 @@
 #include "geometry/base/files.h"
 #include "geometry/base/zones.h"
 #include "skin/color/lava_color.h"
-#include "skin/detail/displace.h"
 #include "skin/preview/preview.h"
 #include "skin/surface/level_set.h"
+#include "skin/tessellate/make_skin.h"
 
 namespace effuse {
 
@@ -47,33 +47,30 @@ FrameWriter::Result FrameWriter::write_frame(const flow::Simulation& simulation)
   const skin::Metadata about = metadata(frame, simulation.time());
   Result result;
   if (!settings_.ply && !settings_.obj && !settings_.glb && !settings_.vdb && !preview_) return result;  // nobody asked for a skin
-  geometry::TriMesh mesh;
-  skin::LevelSet surface;
+  skin::Skin skin;
   for (const auto& effect : simulation.effects()) {
     if (effect->spacing() <= 0) continue;
-    skin::LevelSetOptions options = settings_.level_set;
-    options.spacing = effect->spacing();
-    options.voxel = settings_.voxel * options.spacing;
     const geometry::Points points = effect->points();
-    surface = skin::build_level_set(points, effect->volume(), &terrain_, options);
-    mesh = skin::mesh_level_set(surface);
-    result.volume = surface.report().volume;
+    skin::SkinOptions options = skin::skin_at(settings_, terrain_, frame / scene_.fps, effect->spacing());
+    options.detail->seed = scene_.seed;
+    options.detail->rest_ratio = points.rest_ratio;
+    skin = skin::make_skin(points, effect->volume(), &terrain_, options, &last_);
+    skin::color_lava(skin.mesh, settings_.color);
+    result.volume = skin.report.level_set.volume;
     result.particle_volume = effect->volume();
-    skin::DisplaceOptions detail = skin::detail_at(settings_, terrain_, frame / scene_.fps);
-    detail.spacing = options.spacing;
-    detail.seed = scene_.seed;
-    detail.rest_ratio = points.rest_ratio;
-    skin::displace(mesh, points, &terrain_, detail);
-    skin::color_lava(mesh, settings_.color);
   }
+  const geometry::TriMesh& mesh = skin.mesh;
+  result.regions = skin.regions.size();
+  result.shapes = skin.report.shapes;
+  result.held_back = skin.report.displace.held_back;
   result.triangles = mesh.triangles.size();
   COUNT("skin.triangles", mesh.triangles.size());
 
   const fs::path frames = folder_ / "frames";
-  if (settings_.ply) skin::write_ply(frames / numbered("skin", frame, "ply"), mesh, about);
+  if (settings_.ply) skin::write_skin_ply(frames / numbered("skin", frame, "ply"), mesh, skin.regions, about);
   if (settings_.obj) skin::write_obj(frames / numbered("skin", frame, "obj"), mesh, about);
   if (settings_.glb) skin::write_glb(frames / numbered("skin", frame, "glb"), mesh, about);
-  if (settings_.vdb) skin::write_vdb(frames / numbered("lava", frame, "vdb"), surface, about);
+  if (settings_.vdb) skin::write_vdb(frames / numbered("lava", frame, "vdb"), skin.surface, about);
   if (preview_) {
     const skin::Image image = preview_->render(mesh, skin::picture_at(settings_, terrain_, frame / scene_.fps));
     skin::write_png(folder_ / "preview" / numbered("preview", frame, "png"), image);
@@ -124,7 +121,7 @@ void FrameWriter::write_manifest(int frames_done, const std::vector<std::pair<st
   if (settings_.preview) files["preview"] = "preview/preview.####.png";
   m["files"] = files;
   for (const auto& [name, path] : flow) m["flow"][name] = path;
-  m["attributes"] = {{"temperature", "K"}, {"velocity", "m/s"}, {"crust", "0 molten .. 1 solid"}};
+  m["attributes"] = {{"temperature", "K"}, {"velocity", "m/s"}, {"crust", "0 molten .. 1 solid"}, {"region", "id of the particle whose Voronoi region it is, PLY only"}};
   ordered_json times = ordered_json::array();
   for (int frame = 1; frame <= frames_done; ++frame) times.push_back(scene_.frame_time(frame));
   m["frame_times"] = times;

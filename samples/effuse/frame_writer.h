@@ -15,7 +15,7 @@
 namespace effuse {
 
 /// Turns the simulation's state into the files of a frame: skin meshes, volume, picture; and the run
-/// folder's terrain, contact sheet and manifest. Stateless from frame to frame, so that a run resumed
+/// folder's terrain, contact sheet and manifest. A frame's bytes hang on its state alone, so that a run resumed
 /// writes the bytes it would have.
 class FrameWriter {
  public:
@@ -29,6 +29,9 @@ class FrameWriter {
     std::size_t triangles = 0;
     Real volume = 0;           ///< enclosed by the skin above ground [m^3]
     Real particle_volume = 0;  ///< [m^3]
+    std::size_t regions = 0;   ///< particles that the skin has a region of
+    skin::TriangleShapes shapes;  ///< of its triangles
+    std::size_t held_back = 0;    ///< vertices displaced less than asked for
   };
   /// frames/skin.0001.*, frames/lava.0001.vdb, preview/preview.0001.png
   Result write_frame(const flow::Simulation& simulation);
@@ -46,6 +49,7 @@ class FrameWriter {
   const geometry::Terrain& terrain_;
   std::filesystem::path folder_;
   std::unique_ptr<skin::Preview> preview_;
+  skin::SurfaceCache last_;  // saves work, changes nothing
 };
 
 }  // namespace effuse

@@ -81,6 +81,10 @@ void add_skin_options(CLI::App* verb, effuse::SkinCommand& skin) {
                    "passes of mean-curvature flow on the level set before it is meshed, each of radius^2 / 6 (about three of splashsurf's on its mesh at cube size 0.5); drops keep their size [2]")
       ->check(CLI::Range(0, 100));
   verb->add_option("--drop-volume", skin.drop_volume, "leave out closed pieces, and fill bubbles, of less than this many particles' volume [0]")->check(CLI::Range(0.0, 1e9));
+  verb->add_option("--tessellation", skin.tessellation, "levelset: triangles of one size; voronoi: fans of triangles, a spacing wide, on each particle's part of the surface. PLY carries the particle's id as region: of vertices, and with voronoi of faces [levelset]")
+      ->check(CLI::IsMember({"levelset", "voronoi"}));
+  verb->add_option("--coarsen", skin.coarsen, "fewer triangles where the surface is flat to so many particle spacings (2 radii), 0.1 say; 0: none; goes with levelset [0]")->check(CLI::Range(0.0, 1.0));
+  verb->add_option("--terrain", skin.terrain, "ground to end the skin at: a DEM grid (ESRI ASCII) or a mesh, z up, in the coordinates of the particles; what they enclose is counted above it");
   verb->add_option("--sph-normals", skin.sph_normals, "on: normals of the field's gradient, off: of the triangles; normals are always written [on]")->transform(CLI::CheckedTransformer(switches));
   verb->add_option_function<bool>(
           "--normals",
@@ -98,7 +102,7 @@ void add_skin_options(CLI::App* verb, effuse::SkinCommand& skin) {
   verb->footer("Exit codes: 0 done, 1 a check of the mesh failed, 2 wrong use or bad input, 5 out of disk or memory.");
   // Ranges let nan through.
   const CLI::Validator finite([](std::string& text) { return std::isfinite(std::strtod(text.c_str(), nullptr)) ? "" : "must be a finite number"; }, "");
-  for (const char* name : {"-r", "-l", "-c", "-t", "--drop-volume", "--particle-aabb-min", "--particle-aabb-max"}) verb->get_option(name)->check(finite);
+  for (const char* name : {"-r", "-l", "-c", "-t", "--drop-volume", "--coarsen", "--particle-aabb-min", "--particle-aabb-max"}) verb->get_option(name)->check(finite);
 }
 
 bool out_of_resources(const std::system_error& error) {
@@ -157,7 +161,7 @@ int main(int argc, char** argv) {
 
   effuse::StudyCommand study;
   CLI::App* study_verb = add_common(app.add_subcommand("study", "compare effuse with exact, converged and measured references: tables, curves, plots, a page"));
-  study_verb->add_option("name", study.names, "studies: validation; all when absent");
+  study_verb->add_option("name", study.names, "studies: validation, skin; all when absent");
   study_verb->add_option("-o,--output", study.folder, "folder to write; out/study when absent");
   study_verb->add_option("--case", study.cases, "run this case only; may be given several times")->allow_extra_args(false);
   study_verb->add_flag("--full", study.full, "the slow cases, too: minutes each");

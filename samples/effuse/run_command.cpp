@@ -108,6 +108,7 @@ class RunRecord {
       for (const ordered_json& frame : old.at("frames"))
         if (frame.at("frame").get<int>() <= last) frames_.push_back(frame);
       earlier_s_ = old.at("seconds").get<double>();
+      if (old.contains("skin") && old.at("skin").at("frame").get<int>() <= last) skin_ = old.at("skin");
     } catch (const std::exception&) {
       frames_ = ordered_json::array();
       log_warning(fmt::format("{} is missing, damaged or of another scene: the hashes of the frames up to {} are not in the new one", (folder_ / "run.json").string(), last));
@@ -121,6 +122,14 @@ class RunRecord {
                        {"triangles", result.triangles},
                        {"skin_volume_m3", result.volume},
                        {"particle_volume_m3", result.particle_volume}});
+    if (result.triangles == 0) return;
+    skin_ = {{"frame", simulation.frame()},
+             {"triangles", result.triangles},
+             {"regions", result.regions},
+             {"thin_triangles_share", result.shapes.thin},
+             {"least_angle_deg", result.shapes.least_angle},
+             {"folded_triangles", result.shapes.folded},
+             {"held_back_vertices", result.held_back}};
   }
 
   ordered_json document(const flow::Simulation& simulation, const Profile& profile, const std::string& outcome) const {
@@ -144,6 +153,7 @@ class RunRecord {
     }
     for (const ZoneRow& row : profile.zones()) j["zones"][row.name] = {{"self_s", row.self_s}, {"total_s", row.total_s}, {"calls", row.calls}};
     for (const CounterRow& row : profile.counters()) j["counters"][row.name] = row.value;
+    if (!skin_.empty()) j["skin"] = skin_;
     j["frames"] = frames_;
     return j;
   }
@@ -154,6 +164,7 @@ class RunRecord {
   const LoadedScene& loaded_;
   fs::path folder_;
   ordered_json frames_ = ordered_json::array();
+  ordered_json skin_;  // of the last frame with one
   double earlier_s_ = 0;
 };
 

@@ -17,8 +17,10 @@
 #include "importers/input_file.h"
 #include "importers/points/import_points.h"
 #include "importers/points/spacing.h"
+#include "importers/terrain/import_terrain.h"
 #include "samples/effuse/commands.h"
 #include "skin/surface/level_set.h"
+#include "skin/tessellate/make_skin.h"
 #include "skin/write/write_mesh.h"
 
 namespace effuse {
@@ -261,6 +263,21 @@ skin::LevelSetOptions level_set_options(const SkinCommand& command, Real radius,
   return options;
 }
 
+// The ground.
+
+/// As imported, but in the file's coordinates instead of local ones.
+geometry::Terrain in_file_coordinates(const geometry::Terrain& terrain) {
+  const Vec3 origin = terrain.georeference().origin;
+  if (const geometry::HeightField* field = terrain.height_field()) {
+    std::vector<Real> posts = field->posts();
+    for (Real& z : posts) z += origin.z();
+    return geometry::Terrain::from_height_field(geometry::HeightField(field->corner() + origin.head<2>(), field->spacing(), field->nx(), field->ny(), std::move(posts)));
+  }
+  geometry::TriMesh mesh = terrain.mesh();
+  for (Vec3& x : mesh.positions) x += origin;
+  return geometry::Terrain::from_mesh(std::move(mesh));
+}
+
 // One frame.
 
 void crop(PointCloud& cloud, const Box3& box) {
@@ -361,6 +378,11 @@ class Skinner {
     if (command.particle_aabb_min.size() == 3) box_ = Box3(Vec3(command.particle_aabb_min.data()), Vec3(command.particle_aabb_max.data()));
     if (box_ && box_->isEmpty()) throw InputError(Place{}, "--particle-aabb-min is not below --particle-aabb-max");
     if (command.particle_radius > 0) radius_ = Radius{command.particle_radius, "--particle-radius"};
+    if (!command.terrain.empty()) {
+      const importers::TerrainImport import = importers::import_terrain(command.terrain);
+      for (const std::string& note : import.notes) tell_once(command.terrain, note);
+      terrain_ = in_file_coordinates(import.terrain);
+    }
   }
 
   /// False: its check failed.
@@ -384,15 +406,21 @@ class Skinner {
     const bool match = command_.match_volume.value_or(!command_.surface_threshold && !estimated_);
     Real volume = 0;
     for (const Real r : cloud.radius) volume += 8 * r * r * r;
-    skin::LevelSet surface;
+    if (terrain_ && cloud.size() > 0) look_for_ground(file, cloud);
+    skin::SkinOptions options;
+    options.level_set = level_set_options(command_, radius, match);
+    options.tessellation = command_.tessellation == "voronoi" ? skin::TessellationKind::kVoronoi : skin::TessellationKind::kLevelSet;
+    options.coarsen = command_.coarsen;
+    options.mesh = command_.check || std::any_of(outputs.begin(), outputs.end(), [](const fs::path& f) { return format_of(f) != Format::kVdb; });
+    const bool meshed = options.mesh;
+    skin::Skin skin;
     try {
-      surface = skin::build_level_set(cloud.points(), volume, nullptr, level_set_options(command_, radius, match));
+      skin = skin::make_skin(cloud.points(), volume, terrain_ ? &*terrain_ : nullptr, options, &last_);
     } catch (const InputError& error) {
       throw named(error, file);
     }
-    const bool meshed = command_.check || std::any_of(outputs.begin(), outputs.end(), [](const fs::path& f) { return format_of(f) != Format::kVdb; });
-    geometry::TriMesh mesh;
-    if (meshed && !surface.empty()) mesh = skin::mesh_level_set(surface);
+    const skin::LevelSet& surface = skin.surface;
+    geometry::TriMesh& mesh = skin.mesh;
     if (!command_.sph_normals) geometry::compute_normals(mesh);
     if (cloud.size() > 0) {
       j["radius"] = radius;
@@ -405,6 +433,10 @@ class Skinner {
     if (meshed) {
       j["vertices"] = mesh.positions.size();
       j["triangles"] = mesh.triangles.size();
+      j["regions"] = skin.regions.size();
+      j["thin_triangles_share"] = skin.report.shapes.thin;
+      j["folded_triangles"] = skin.report.shapes.folded;
+      if (skin.report.coarsened > 0) j["coarsen_error"] = skin.report.coarsen_error;
     }
     const skin::LevelSetReport& report = surface.report();
     if (report.dropped_pieces + report.filled_bubbles > 0) {
@@ -419,7 +451,7 @@ class Skinner {
     }
 
     const skin::Metadata about = {{"generator", fmt::format("effuse {}", EFFUSE_VERSION)}, {"particles", file.filename().string()}};
-    for (const fs::path& output : outputs) write(output, mesh, surface, about);
+    for (const fs::path& output : outputs) write(output, skin, about);
     for (const fs::path& output : outputs) j["outputs"].push_back(output.string());
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     j["seconds"] = seconds;
@@ -472,16 +504,24 @@ class Skinner {
     if (!own) cloud.radius.assign(cloud.size(), radius_->value);
   }
 
-  void write(const fs::path& file, const geometry::TriMesh& mesh, const skin::LevelSet& surface, const skin::Metadata& about) const {
+  /// The level set ends at the ground, which has to be where the particles are.
+  void look_for_ground(const fs::path& file, const PointCloud& cloud) {
+    for (const Vec3& x : cloud.position)
+      if (terrain_->height(x.x(), x.y())) return;
+    tell_once(file, fmt::format("no particle lies over {}: it changes nothing", command_.terrain.string()));
+  }
+
+  void write(const fs::path& file, const skin::Skin& made, const skin::Metadata& about) const {
+    const geometry::TriMesh& mesh = made.mesh;
     switch (format_of(file)) {
       case Format::kPly:
-        return skin::write_ply(file, mesh, about);
+        return skin::write_skin_ply(file, mesh, made.regions, about);
       case Format::kObj:
         return skin::write_obj(file, mesh, about);
       case Format::kGlb:
         return command_.up == "y" ? skin::write_glb(file, turned_to_z_up(mesh), about) : skin::write_glb(file, mesh, about);
       case Format::kVdb:
-        return skin::write_vdb(file, surface, about);
+        return skin::write_vdb(file, made.surface, about);
     }
   }
 
@@ -489,6 +529,8 @@ class Skinner {
   const CommonOptions& common_;
   std::optional<Box3> box_;
   std::optional<Radius> radius_;
+  std::optional<geometry::Terrain> terrain_;
+  skin::SurfaceCache last_;  // of the frame before
   bool estimated_ = false;
   std::vector<std::string> told_;
   ordered_json frames_ = ordered_json::array();
@@ -501,6 +543,8 @@ ExitCode skin_particles(const SkinCommand& command, const CommonOptions& common)
   if (command.surface_threshold && command.match_volume.value_or(false))
     throw InputError(Place{}, "--surface-threshold and --match-volume on: the surface lies where the one or the other puts it");
   if (!command.match_volume.value_or(true) || command.surface_threshold) level_set_options(command, 1, false);  // refused now, if at all
+  if (command.coarsen > 0 && command.tessellation == "voronoi") throw InputError(Place{}, "--coarsen goes with --tessellation levelset: voronoi's triangles belong to their particles");
+  if (!command.terrain.empty() && command.up == "y") throw InputError(Place{}, "--terrain is z up, and so must the particles be: not --up y");
   const Inputs inputs = find_inputs(command);
   // Names are refused before the first frame is made.
   if (inputs.single) outputs_of(command, std::nullopt, *inputs.single);

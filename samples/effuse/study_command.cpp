@@ -18,7 +18,10 @@ struct Study {
   std::vector<study::Case> (*cases)();
 };
 
-std::vector<Study> studies() { return {{"validation", "the modern lava beside exact solutions, benchmarks and experiments", &study::validation_cases}}; }
+std::vector<Study> studies() {
+  return {{"validation", "the modern lava beside exact solutions, benchmarks and experiments", &study::validation_cases},
+          {"skin", "the skin of solids filled with particles beside the solids, its relief and colour; --full makes a sheet of close-ups", &study::skin_cases}};
+}
 
 /// A log that nobody reads any more must not end a study.
 void say(const std::string& line) {

@@ -25,6 +25,12 @@ bool fits_a_file_name(const std::string& name) {
   return !name.empty() && name.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") == std::string::npos;
 }
 
+/// Of a picture: such a name, and an ending.
+bool fits_a_picture(const std::string& file) {
+  const std::size_t dot = file.find('.');
+  return dot != std::string::npos && fits_a_file_name(file.substr(0, dot)) && fits_a_file_name(file.substr(dot + 1));
+}
+
 fs::path result_file(const fs::path& folder, const std::string& name) { return folder / "cases" / (name + ".json"); }
 
 /// What cannot be drawn or filed is the case's failure. owner: the case that each plot's file belongs to.
@@ -37,6 +43,8 @@ void check_plots(const Outcome& outcome, const std::map<std::string, std::string
     for (const Curve& curve : plot.curves)
       if (curve.x.size() != curve.y.size()) throw std::runtime_error(fmt::format("plot '{}', curve '{}': {} x and {} y", plot.file, curve.name, curve.x.size(), curve.y.size()));
   }
+  for (const Picture& picture : outcome.result.pictures)
+    if (!fits_a_picture(picture.file)) throw std::runtime_error(fmt::format("picture '{}': a file's name is made of letters, digits, _ and -, and an ending", picture.file));
 }
 
 /// The result of an earlier call, if the folder has one that may be kept.
@@ -74,7 +82,7 @@ Outcome run_case(const Case& c, const std::string& version, const std::map<std::
   return outcome;
 }
 
-void write_plots(const StudyOptions& options, const Outcome& outcome) {
+void write_pictures(const StudyOptions& options, const Outcome& outcome) {
   const fs::path folder = options.folder / "plots";
   for (const Plot& plot : outcome.result.plots) {
     const Drawing drawing = draw(plot);
@@ -82,6 +90,7 @@ void write_plots(const StudyOptions& options, const Outcome& outcome) {
     write_file(folder / (plot.file + ".svg"), svg_file(drawing));
     write_file(folder / (plot.file + ".png"), png_file(drawing, options.picture_scale));
   }
+  for (const Picture& picture : outcome.result.pictures) write_file(options.folder / "pictures" / picture.file, picture.bytes);
 }
 
 void write_tables(const StudyOptions& options, const StudyReport& report) {
@@ -145,7 +154,7 @@ StudyReport run_study(const std::vector<Case>& cases, const StudyOptions& option
     progress(n + 1, wanted.size(), c, nullptr);
     Outcome outcome = run_case(c, options.version, owner);
     for (const Plot& plot : outcome.result.plots) owner.emplace(plot.file, c.name);
-    write_plots(options, outcome);
+    write_pictures(options, outcome);
     write_file(result_file(options.folder, c.name), outcome_json(outcome));
     outcomes[wanted[n]] = std::move(outcome);
     write_tables(options, report());

@@ -32,10 +32,11 @@ using StudyProgress = std::function<void(std::size_t k, std::size_t n, const Cas
 ///   NAME.html          the page (page.h)
 ///   NAME.csv, .json    its table (outcome.h)
 ///   plots/FILE.svg, .png, .csv   of each plot of each case (plot.h)
+///   pictures/FILE      of each picture of each case
 ///   cases/CASE.json    what --resume reads
 ///
 /// A case that throws becomes an outcome with `failure`; the others go on. So does one whose result cannot be shown: plots
-/// without a name of letters, digits, _ and -, of another case's name, or of curves with x and y of different length.
+/// or pictures without a name of letters, digits, _ and -, plots of another case's name, or of curves with x and y of different length.
 /// With resume, results of this version in the folder are kept and shown, chosen or not; failed ones run again. A result
 /// outlives a change to the code that keeps the version: remove its file in cases/ to have it run anew.
 /// Throws InputError, before anything is written, for a name that no case has and for a folder that cannot be made.

@@ -34,9 +34,16 @@ struct Measure {
   bool passed() const { return error <= hold; }  // not a number: not passed
 };
 
+/// A picture that a case made: its file's name, without folder, and its bytes.
+struct Picture {
+  std::string file;  ///< "skin-kinds.jpg"
+  std::string bytes;
+};
+
 struct CaseResult {
   std::vector<Measure> measures;
   std::vector<Plot> plots;   ///< the first one is the case's own: measured beside reference
+  std::vector<Picture> pictures;  ///< for the study's folder pictures/; not kept in the result's JSON
   std::string note;          ///< resolution, method, what was left out; one or two sentences
 };
 
@@ -50,6 +57,8 @@ struct Case {
 
 /// All cases of the validation set, in the order of the page.
 std::vector<Case> validation_cases();
+/// All cases of the skin: its surface beside solids, its relief, its colour, its pictures.
+std::vector<Case> skin_cases();
 
 // By subject; each in its own file under validation/.
 void add_operator_cases(std::vector<Case>& cases);   // operators alone

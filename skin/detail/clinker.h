@@ -9,8 +9,8 @@ namespace effuse::skin {
 /// How far clinkers have come at a point: 0 molten .. 1 cold and crusted. Both C1; rises with cold.
 struct ClinkerGrowth {
   Real height = 0;     ///< share of their full height: cold^1.5, so that they come after the swell
-  Real size = 0;       ///< how soon after the border they are up: 0.9 (domes) .. 1.05 (blocks with tops)
-  Real roughness = 0;  ///< of their tops, share of their height: 0 .. 0.45
+  Real size = 0;       ///< how soon after the border they are up: 0.9 (domes) .. 1.05 (blocks with broken faces)
+  Real roughness = 0;  ///< of their tops, share of their height: 0 .. 0.3
 };
 ClinkerGrowth clinker_growth(Real cold);
 
@@ -22,11 +22,15 @@ ClinkerGrowth clinker_growth(Real cold);
 /// spacing apart: steeper sides would flicker where particles pass one another.
 Real clinker_dome(Real inside, Real size);
 
-/// A clinker's height over its region's border at a point: 0 on the border, with no slope there, whatever its neighbours do.
+/// A clinker's height over its region's border at a point: 0 on the border, with no slope there, whatever its neighbours do. The less
+/// of a side and a top, their rim rounded by a norm:
 ///
-///   z = dome (share (1 + tilt . (u, v)) + roughness rough(u, v)),   dome = clinker_dome(inside, size)
+///   z    = (side^-6 + lid^-6)^(-1/6),   side = 1.5 clinker_dome(inside, size),   lid = top, held above 0 softly
+///   top  = share (1 + tilt . (u, v) - 2.2 sharp sum_k max(n_k . (u, v) - d_k, 0)) + roughness rough(u, v)
 ///
-///   share, tilt  random by id: 0.55 .. 1.1, and up to 0.7 in (u, v)
+///   share, tilt  random by id: 0.3 .. 1.3, small ones more often, and up to 0.9 in (u, v)
+///   n_k, d_k     five faces broken off all round: directions, and distances up to 0.3; edges rounded over 0.05
+///   sharp        0 .. 1 as growth.size goes from domes to blocks
 ///   rough        triangle noise of three octaves, the first 0.6 spacings wide, each id another part of it
 ///   (u, v)       offset from the particle in material coordinates, across the surface [spacings]
 ///

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <vector>
 
 #include "geometry/base/check.h"
@@ -143,18 +144,9 @@ void move_along_normals(TriMesh& mesh, std::vector<Real>& height, std::vector<fl
   mesh.attributes["detail"] = {1, std::move(detail)};
 }
 
-}  // namespace
-
-DisplaceReport displace(TriMesh& mesh, const geometry::Terrain* terrain, const DisplaceOptions& o) {
-  ZONE("skin.displace");
-  check(o);
+/// Noise from the mesh's own attributes.
+DisplaceReport displace_by_noise(TriMesh& mesh, const geometry::Terrain* terrain, const DisplaceOptions& o) {
   DisplaceReport report;
-  // A dual mesh's mean edge is 1.1 to 1.2 of its voxel: refined only when clearly too coarse, so that frames agree.
-  constexpr int kMostRefined = 3;
-  for (Real edge = mean_edge(mesh); edge > kTooCoarse * o.edge * o.spacing && report.refined < kMostRefined; edge /= 2, ++report.refined)
-    mesh = refine(mesh);
-  if (mesh.normals.empty()) geometry::compute_normals(mesh);
-
   const std::size_t n = mesh.positions.size();
   const MeshMaterial material(mesh, o);
   const float* temperature = find_attribute(mesh, "temperature", 1);
@@ -177,17 +169,8 @@ DisplaceReport displace(TriMesh& mesh, const geometry::Terrain* terrain, const D
   return report;
 }
 
-DisplaceReport displace(TriMesh& mesh, const geometry::Points& points, const geometry::Terrain* terrain, const DisplaceOptions& o) {
-  if (o.kind == SkinKind::kNoise) return displace(mesh, terrain, o);
-  ZONE("skin.displace");
-  check(o);
+DisplaceReport displace_by_relief(TriMesh& mesh, const geometry::Points& points, const geometry::Terrain* terrain, const DisplaceOptions& o) {
   DisplaceReport report;
-  RefineOptions fine;
-  fine.edge = kTooCoarse * o.edge * o.spacing;
-  fine.view = o.view;
-  report.refined = refine_to(mesh, fine).rounds;
-  if (mesh.normals.empty()) geometry::compute_normals(mesh);
-
   const std::size_t n = mesh.positions.size();
   const Relief relief(points, o);
   std::vector<float> detail(n);
@@ -199,6 +182,52 @@ DisplaceReport displace(TriMesh& mesh, const geometry::Points& points, const geo
     height[i] = sample.height * ground_share(terrain, x, o.spacing);
   });
   move_along_normals(mesh, height, std::move(detail), report);
+  return report;
+}
+
+}  // namespace
+
+RefineOptions fineness(const DisplaceOptions& o) {
+  RefineOptions fine;
+  fine.edge = kTooCoarse * o.edge * o.spacing;
+  fine.view = o.view;
+  return fine;
+}
+
+RefineToReport refine_for(TriMesh& mesh, const DisplaceOptions& o) {
+  check(o);
+  if (o.kind != SkinKind::kNoise) return refine_to(mesh, fineness(o));
+  RefineToReport report;
+  report.parent.resize(mesh.triangles.size());
+  std::iota(report.parent.begin(), report.parent.end(), Index{0});
+  // A dual mesh's mean edge is 1.1 to 1.2 of its voxel: refined only when clearly too coarse, so that frames agree.
+  constexpr int kMostRefined = 3;
+  for (Real edge = mean_edge(mesh); edge > kTooCoarse * o.edge * o.spacing && report.rounds < kMostRefined; edge /= 2, ++report.rounds) {
+    mesh = refine(mesh);
+    std::vector<Index> parent(mesh.triangles.size());
+    for (std::size_t t = 0; t < parent.size(); ++t) parent[t] = report.parent[t / 4];  // each triangle's four follow one another
+    report.parent = std::move(parent);
+  }
+  return report;
+}
+
+DisplaceReport displace_only(TriMesh& mesh, const geometry::Points& points, const geometry::Terrain* terrain, const DisplaceOptions& o) {
+  ZONE("skin.displace");
+  check(o);
+  if (mesh.normals.empty()) geometry::compute_normals(mesh);
+  return o.kind == SkinKind::kNoise ? displace_by_noise(mesh, terrain, o) : displace_by_relief(mesh, points, terrain, o);
+}
+
+DisplaceReport displace(TriMesh& mesh, const geometry::Terrain* terrain, const DisplaceOptions& options) {
+  DisplaceOptions noise = options;
+  noise.kind = SkinKind::kNoise;
+  return displace(mesh, {}, terrain, noise);
+}
+
+DisplaceReport displace(TriMesh& mesh, const geometry::Points& points, const geometry::Terrain* terrain, const DisplaceOptions& o) {
+  const int refined = refine_for(mesh, o).rounds;
+  DisplaceReport report = displace_only(mesh, points, terrain, o);
+  report.refined = refined;
   return report;
 }
 

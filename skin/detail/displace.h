@@ -72,4 +72,15 @@ DisplaceReport displace(geometry::TriMesh& mesh, const geometry::Terrain* terrai
 DisplaceReport displace(geometry::TriMesh& mesh, const geometry::Points& points, const geometry::Terrain* terrain,
                         const DisplaceOptions& options);
 
+/// The two halves of that, for who has something to do between them: displace() is refine_for() and then displace_only().
+/// Regions, say, are those of the smooth surface, before vertices move.
+///
+/// Cuts the mesh as finely as the options ask; kNoise: all triangles alike, in fours. parent: as in refine.h.
+RefineToReport refine_for(geometry::TriMesh& mesh, const DisplaceOptions& options);
+/// How finely that is, kNoise apart.
+RefineOptions fineness(const DisplaceOptions& options);
+/// Moves the vertices that there are. DisplaceReport::refined: 0.
+DisplaceReport displace_only(geometry::TriMesh& mesh, const geometry::Points& points, const geometry::Terrain* terrain,
+                             const DisplaceOptions& options);
+
 }  // namespace effuse::skin

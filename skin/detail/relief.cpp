@@ -16,7 +16,9 @@ namespace effuse::skin {
 namespace {
 
 constexpr Real kDeviation = 0.28;      // of gradient_noise
-constexpr Real kMeanRubble = 0.57;     // of rubble(): measured, see the test of means
+constexpr Real kMeanFragment = 0.185;  // of fragments(): measured, see the test of means
+constexpr Real kFragment = 1.9;        // [spacings] size of the largest fragments
+constexpr Real kFragmentFiner = 0.56, kFragmentGain = 0.65;
 constexpr Real kMostDisplaced = 0.35;  // [spacings]
 
 /// n's picture under the linear map A of its tangent plane, unit: the cross product of two mapped tangents; n where A has none.
@@ -61,19 +63,26 @@ Real Relief::blended(const Here& here, Real wave, const Vec3& offset, std::uint6
   return n / here.contrast;
 }
 
-/// Bumps between narrow creases, 0 .. 1: 1 - exp(-|n| / 0.14) of each octave, round at the bottom so that it is C1.
-Real Relief::rubble(const Here& here, Real wavelength, int octaves, Real edge, std::uint64_t seed) const {
-  constexpr Real kCrease = 0.14, kRound = 0.05;
-  Real sum = 0, total = 0, height = 1, wave = wavelength * o_.spacing;
-  for (int k = 0; k < octaves; ++k, height *= 0.65, wave /= 2) {
+/// Broken rock: each piece (plates.h) a wedge, its crest and its two faces at random; pieces of each octave lie on those of
+/// the one before. About 0 in the joints .. 1.
+Real Relief::fragments(const Here& here, int octaves, Real edge, std::uint64_t seed) const {
+  constexpr Real kRound = 0.05;  // of the crests
+  Real sum = 0, total = 0, height = 1, wave = kFragment * o_.spacing;
+  for (int k = 0; k < octaves; ++k, height *= kFragmentGain, wave *= kFragmentFiner) {
     total += height;
-    const Real seen = k == 0 ? 1 : smoothstep(1.9, 3.8, wave / edge);
-    Real level = kMeanRubble;
-    if (seen > 0) {
-      const Real n = blended(here, wave, Vec3(0.37 * k, 0.71 * k, 0.53 * k), seed + static_cast<std::uint64_t>(k));
-      level += seen * (-std::expm1(-(std::sqrt(n * n + kRound * kRound) - kRound) / kCrease) - kMeanRubble);
-    }
-    sum += height * level;
+    const Real seen = k == 0 ? 1 : smoothstep(2.5, 5, wave / edge);
+    Real level = 0;
+    if (seen > 0)
+      for (int f = 0; f < 2; ++f) {
+        if (here.share[f] <= 0) continue;
+        const PlatePlace at = plate_at(here.m.rest[f] / wave + Vec3(0.37 * k, 0.71 * k, 0.53 * k), kWidestPlateSlope, seed + static_cast<std::uint64_t>(k));
+        const auto draw = [&](std::uint64_t which) { return 2 * random_uniform(seed, at.id, which) - 1; };
+        const Real across = Vec3(draw(1), draw(2), draw(3)).dot(at.from_middle) + 0.1 * draw(7);
+        const Real lean = Vec3(draw(4), draw(5), draw(6)).dot(at.from_middle);
+        const Real wedge = 0.65 + 0.4 * draw(0) + 0.9 * lean - 2.2 * (std::sqrt(across * across + kRound * kRound) - kRound);
+        level += here.share[f] * (at.inside * wedge - kMeanFragment);
+      }
+    sum += height * (kMeanFragment + seen * level / here.contrast);
   }
   return sum / total;
 }
@@ -138,14 +147,15 @@ Relief::Sample Relief::aa(const Here& here, Real edge) const {
               across(mapped_normal(here.m.slope[f], here.normal), here.m.rest[f] - material_.rest_of(place.particle, f));
     z = clinker(place, id_[place.particle], uv, growth, o_.seed);
   }
-  // Between the clinkers lies what broke off them.
-  const Real small = rubble(here, 1.1, o_.octaves, edge, o_.seed + 100);
+  // What broke off them lies on them and between.
+  const Real small = fragments(here, o_.octaves, edge, o_.seed + 100);
   Sample s;
-  s.height = (o_.molten_share + (0.5 - o_.molten_share) * here.cold) * swells + growth.height * 2.1 * (z - mean_clinker(growth.size)) +
-             here.cold * o_.roughness * 1.3 * (small - kMeanRubble);
+  s.height = (o_.molten_share + (0.5 - o_.molten_share) * here.cold) * swells + growth.height * 1.1 * (z - mean_clinker(growth.size)) +
+             here.cold * o_.roughness * 2.5 * (small - kMeanFragment);
   const Real dome = place.particle == Regions::kNone ? 1 : clinker_dome(place.inside, growth.size);
   const Real top = std::clamp(std::cbrt(dome) * (0.7 + 0.3 * z), Real{0}, Real{1});
-  s.detail = 2 * (1 - (1 - top) * (1 - 0.8 * small)) - 1;
+  // Outlines as broken as the rock.
+  s.detail = 2 * (1 - (1 - top) * (1 - std::min(1.35 * small, Real{1})) + 0.45 * (small - kMeanFragment)) - 1;
   return s;
 }
 
@@ -168,7 +178,7 @@ Relief::Sample Relief::pahoehoe(const Here& here, Real edge) const {
   Sample s;
   const Real grown = o_.molten_share + (1 - o_.molten_share) * here.cold;
   s.height = grown * (0.6 * swells + 0.75 * ropes + 0.02 * o_.roughness * here.cold * wrinkles);
-  s.detail = 0.45 + 0.3 * swells + 0.45 * ropes + 0.05 * wrinkles;
+  s.detail = 0.25 + 0.3 * swells + 0.6 * ropes + 0.05 * wrinkles;
   return s;
 }
 
@@ -204,8 +214,9 @@ Relief::Sample Relief::block(const Here& here, Real edge) const {
     level += here.share[f] * rim;
   }
   const Real fine = swell(here, 1, o_.octaves, o_.gain, edge, o_.seed + 100);
+  const Real grown = here.cold * here.cold;  // after the swell: the two may lean against one another
   Sample s;
-  s.height = (o_.molten_share + (0.4 - o_.molten_share) * here.cold) * swells + here.cold * (1.5 * (z - 0.75) + 0.1 * o_.roughness * level * fine);
+  s.height = (o_.molten_share + (0.5 - o_.molten_share) * here.cold) * swells + grown * (1.5 * (z - 0.75) + 0.1 * o_.roughness * level * fine);
   s.detail = 2 * std::clamp(level * (0.85 + 0.1 * fine), Real{0}, Real{1}) - 1;
   return s;
 }
@@ -228,7 +239,7 @@ Relief::Sample Relief::obsidian(const Here& here, Real edge) const {
   folds *= squeeze.amount / here.contrast;
   Sample s;
   s.height = (o_.molten_share + (1 - o_.molten_share) * here.cold) * (0.5 * swells + 0.9 * folds);
-  s.detail = 0.6 + 0.2 * swells + 0.35 * folds;
+  s.detail = 0.4 + 0.2 * swells + 0.5 * folds;
   return s;
 }
 

@@ -14,8 +14,9 @@ namespace effuse::skin {
 ///
 ///   cold       max(crust, 1 - smoothstep(solid, molten, T)), from the particles nearby
 ///   swell      gradient noise of `octaves` in both frames, of deviation 1; blended as in displace()
-///   kAa        swell; a clinker (clinker.h) on each particle's region; rubble on and between them, bumps between narrow creases. All
-///              grow with cold
+///   kAa        swell; a clinker (clinker.h) on each particle's region; fragments on and between them: broken pieces (plates.h), each a
+///              wedge with a crest of its own, the largest 1.9 spacings, each octave's 0.56 times as wide as the one before. All grow
+///              with cold
 ///   kPahoehoe  swell; rope_profile(fold_noise) across the squeeze (folds.h), where there is one; fine wrinkles
 ///   kBlock     plates (plates.h) 4/3 wavelengths across, each at a height and a tilt of its own; cracks between them open as the material
 ///              stretches: half of what a plate would have to grow by. Plates' tops carry fine roughness
@@ -40,7 +41,7 @@ class Relief {
  private:
   struct Here;
   Real blended(const Here& here, Real wave, const Vec3& offset, std::uint64_t seed) const;
-  Real rubble(const Here& here, Real wavelength, int octaves, Real edge, std::uint64_t seed) const;
+  Real fragments(const Here& here, int octaves, Real edge, std::uint64_t seed) const;
   Real swell(const Here& here, Real wavelength, int octaves, Real gain, Real edge, std::uint64_t seed) const;
   Sample aa(const Here&, Real edge) const;
   Sample pahoehoe(const Here&, Real edge) const;

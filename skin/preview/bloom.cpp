@@ -18,6 +18,7 @@ struct Plane {
 };
 
 constexpr int kShrink = 4;
+constexpr float kHueKept = 0.25f;
 
 /// What exceeds white, a quarter of the size, by the mean of 4 x 4.
 Plane bright_part(const Image& image) {
@@ -102,15 +103,17 @@ void add_bloom(Image& image, float amount) {
 }
 
 void tone_map(float (&rgb)[3]) {
-  // Film's dyes are not pure: bright red leaks into green, bright green into blue. Hot rock, which on a screen's
-  // primaries is almost pure red, so turns orange, then yellow, then white, as it does in photographs.
   for (float& x : rgb) x = std::max(0.0f, x);
-  rgb[1] += 0.085f * std::max(0.0f, rgb[0] - 0.2f);
-  rgb[2] += 0.08f * std::max(0.0f, rgb[1] - 0.5f);
-  for (float& x : rgb) {
-    // Rational fit of a film's response (K. Narkowicz 2015, "ACES filmic tone mapping curve").
-    x = std::min(1.0f, x * (2.51f * x + 0.03f) / (x * (2.43f * x + 0.59f) + 0.14f));
-  }
+  // Film's dyes are not pure: green leaks into blue, so that yellow pales as it brightens.
+  rgb[2] += 0.05f * std::max(0.0f, rgb[1] - rgb[2] - 0.1f);
+  // Rational fit of a film's response (K. Narkowicz 2015, "ACES filmic tone mapping curve").
+  const auto film = [](float x) { return std::min(1.0f, x * (2.51f * x + 0.03f) / (x * (2.43f * x + 0.59f) + 0.14f)); };
+  // Channel by channel hot rock, which is almost pure red, turns yellow long before it is; with its hue kept it stays red
+  // however bright. Photographs lie between.
+  const float peak = std::max({rgb[0], rgb[1], rgb[2]});
+  if (!(peak > 0)) return;
+  const float brightest = film(peak);
+  for (float& x : rgb) x = mix(film(x), brightest * (x / peak), kHueKept);
 }
 
 }  // namespace effuse::skin

@@ -8,7 +8,9 @@ namespace effuse::skin {
 /// height. amount 0 leaves the image as it is. Same bits on any number of threads.
 void add_bloom(Image& image, float amount);
 
-/// The filmic curve of write_png, 0.. to 0..1: a toe, a near-straight middle, a shoulder; very bright colours pale.
+/// What write_png does to light, 0.. to 0..1: a film's curve (a toe, a near-straight middle, a shoulder) on each channel, mixed
+/// with a quarter of the same curve on the brightest channel alone, which keeps the hue. Lava with default glow so comes out deep
+/// red at 1100 K, orange at 1300 K, yellow at 1450 K, not yellow all over. Greys as by the curve; rises with each grey. Strong yellow pales.
 void tone_map(float (&rgb)[3]);
 
 }  // namespace effuse::skin

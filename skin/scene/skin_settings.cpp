@@ -19,6 +19,10 @@ SkinSettings read_skin_settings(flow::Parameters& root) {
   level_set.smoothing = static_cast<int>(skin.integer("smoothing", level_set.smoothing, 0, 20, "passes of mean-curvature flow"));
   level_set.drop_volume = skin.number("drop_volume", "", level_set.drop_volume, Parameters::not_negative(), "pieces of fewer particles are left out");
   level_set.match_volume = skin.flag("match_volume", level_set.match_volume, "enclose the particles' volume");
+  s.tessellation = static_cast<TessellationKind>(skin.choice("tessellation", {kTessellationNames.begin(), kTessellationNames.end()}, static_cast<std::size_t>(s.tessellation),
+                                                             "levelset: triangles of one size; voronoi: fans that live with their particle"));
+  s.coarsen = skin.number("coarsen", "", s.coarsen, {0, 1}, "fewer triangles where the skin is flat to so many spacings; 0: none; goes with levelset");
+  if (s.coarsen > 0 && s.tessellation == TessellationKind::kVoronoi) skin.fault("coarsen", "goes with tessellation = \"levelset\": voronoi's triangles belong to their particles");
   DisplaceOptions& detail = s.detail;
   const std::vector<std::string> kinds(kSkinKindNames.begin(), kSkinKindNames.end());
   detail.kind = static_cast<SkinKind>(skin.choice("kind", kinds, static_cast<std::size_t>(detail.kind),
@@ -118,6 +122,17 @@ DisplaceOptions detail_at(const SkinSettings& s, const geometry::Terrain& terrai
   view.half_angle = std::min(1.1 * std::atan(half * std::hypot(Real{1}, aspect)), kPi);
   detail.view = view;
   return detail;
+}
+
+SkinOptions skin_at(const SkinSettings& s, const geometry::Terrain& terrain, Real film_time, Real spacing) {
+  SkinOptions options;
+  options.level_set = s.level_set;
+  options.level_set.spacing = spacing;
+  options.level_set.voxel = s.voxel * spacing;
+  options.tessellation = s.tessellation;
+  options.coarsen = s.coarsen;
+  options.detail = detail_at(s, terrain, film_time);
+  return options;
 }
 
 }  // namespace effuse::skin

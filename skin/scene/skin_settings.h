@@ -9,6 +9,7 @@
 #include "skin/detail/displace.h"
 #include "skin/preview/preview.h"
 #include "skin/surface/level_set.h"
+#include "skin/tessellate/make_skin.h"
 
 namespace effuse::skin {
 
@@ -16,6 +17,8 @@ namespace effuse::skin {
 struct SkinSettings {
   LevelSetOptions level_set;  ///< spacing is the effect's, set when there is one
   Real voxel = 0.5;           ///< in spacings
+  TessellationKind tessellation = TessellationKind::kLevelSet;
+  Real coarsen = 0;           ///< [spacings], of kLevelSet only
   DisplaceOptions detail;     ///< spacing, rest_ratio, seed and view are filled in frame by frame (detail_at)
   Real edge_pixels = 0;       ///< edges this many pixels of the picture long; 0: no view
   LavaColorOptions color;
@@ -41,6 +44,9 @@ SkinSettings read_skin_settings(flow::Parameters& root);
 
 /// The detail's options at a moment of the film [s]: with the view of the picture's camera, when edges go by its pixels.
 DisplaceOptions detail_at(const SkinSettings& settings, const geometry::Terrain& terrain, Real film_time);
+
+/// What make_skin() is to do at a moment of the film [s] with particles of that spacing [m]; detail's seed and rest_ratio are the caller's.
+SkinOptions skin_at(const SkinSettings& settings, const geometry::Terrain& terrain, Real film_time, Real spacing);
 
 /// The picture's options at a moment of the film [s].
 PreviewOptions picture_at(const SkinSettings& settings, const geometry::Terrain& terrain, Real film_time);

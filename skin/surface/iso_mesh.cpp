@@ -207,29 +207,19 @@ bool widen(const Blocks& blocks, float outside, const Field& phi, const std::vec
 }
 
 /// Where each block whose mesh is still good lies in `last`; kNone: to be made. edges: whose quads are to be made.
-std::vector<Index> still_good(const Blocks& blocks, float outside, const Field& phi, const MeshCache& last, std::vector<std::uint8_t>& edges) {
-  std::vector<Index> before(blocks.size(), kNone);
-  edges.assign(blocks.size(), 1);
-  if (last.meshed.empty() || last.outside != outside) return before;
-  std::vector<std::uint8_t> same(blocks.size(), 0);
-  parallel_for(
-      blocks.size(),
-      [&](std::size_t b) {
-        const BlockCoord& c = blocks.coords()[b];
-        before[b] = last.blocks.block_at(Vec3(kSide * c[0], kSide * c[1], kSide * c[2]));
-        same[b] = before[b] != kNone && std::memcmp(&phi[b * kVoxels], &last.phi[before[b] * kVoxels], kVoxels * sizeof(float)) == 0;
-      },
-      256);
+std::vector<Index> still_good(const Blocks& blocks, float outside, const MeshCache& last, std::span<const Index> unchanged, std::vector<std::uint8_t>& edges) {
   std::vector<Index> good(blocks.size(), kNone);
+  edges.assign(blocks.size(), 1);
+  if (unchanged.empty() || last.meshed.empty() || last.outside != outside) return good;
   parallel_for(
       blocks.size(),
       [&](std::size_t b) {
-        if (!same[b]) return;
+        if (unchanged[b] == kNone) return;
         for (std::size_t slot = 0; slot < 27; ++slot) {
-          const Index now = blocks.around(b)[slot], then = last.blocks.around(before[b])[slot];
-          if (now == kNone ? then != kNone : !same[now]) return;
+          const Index now = blocks.around(b)[slot], then = last.blocks.around(unchanged[b])[slot];
+          if (now == kNone ? then != kNone : unchanged[now] == kNone) return;
         }
-        good[b] = before[b];
+        good[b] = unchanged[b];
       },
       256);
   parallel_for(
@@ -244,15 +234,18 @@ std::vector<Index> still_good(const Blocks& blocks, float outside, const Field& 
 
 }  // namespace
 
-geometry::TriMesh iso_mesh(const Blocks& blocks, float outside, const Field& phi, MeshCache* last) {
+geometry::TriMesh iso_mesh(const Blocks& blocks, float outside, const Field& phi, MeshCache* last, std::span<const Index> unchanged) {
   ZONE("skin.iso_mesh");
   CHECK_GE(outside, 0.0f);
   CHECK_EQ(phi.size(), blocks.size() * kVoxels);
-  // -1: all of the block's voxels are inside, 1: outside.
-  std::vector<std::int8_t> side(blocks.size());
+  std::vector<std::int8_t> side(blocks.size());  // as MeshCache::side
   parallel_for(
       blocks.size(),
       [&](std::size_t b) {
+        if (!unchanged.empty() && unchanged[b] != kNone && !last->side.empty()) {
+          side[b] = last->side[unchanged[b]];
+          return;
+        }
         const float* v = &phi[b * kVoxels];
         int inside = 0;
         for (std::size_t k = 0; k < kVoxels; ++k) inside += off_zero(v[k]) < 0;
@@ -261,11 +254,14 @@ geometry::TriMesh iso_mesh(const Blocks& blocks, float outside, const Field& phi
       64);
   Blocks wider;
   Field values;
-  if (widen(blocks, outside, phi, side, wider, values)) return iso_mesh(wider, outside, values, last);
+  if (widen(blocks, outside, phi, side, wider, values)) {
+    if (last) *last = {};
+    return iso_mesh(wider, outside, values);
+  }
 
   std::vector<MeshedBlock> meshed(blocks.size());
   std::vector<std::uint8_t> edges(blocks.size(), 1);
-  const std::vector<Index> good = last ? still_good(blocks, outside, phi, *last, edges) : std::vector<Index>(blocks.size(), kNone);
+  const std::vector<Index> good = last ? still_good(blocks, outside, *last, unchanged, edges) : std::vector<Index>(blocks.size(), kNone);
   parallel_for(
       blocks.size(),
       [&](std::size_t b) {
@@ -311,7 +307,7 @@ geometry::TriMesh iso_mesh(const Blocks& blocks, float outside, const Field& phi
         }
       },
       64);
-  if (last) *last = {blocks, outside, phi, std::move(meshed)};
+  if (last) *last = {blocks, outside, std::move(meshed), std::move(side)};
   return mesh;
 }
 

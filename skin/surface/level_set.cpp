@@ -136,43 +136,58 @@ LevelSet build_level_set(const geometry::Points& points, Real volume, const geom
   Renewal renewal;
   std::vector<std::uint64_t> hash;
   KnownVolumes known;
+  std::vector<std::uint8_t> beside, edge;  // blocks whose cells may have changed; those that lost a neighbour
   if (last) hash = particle_hashes(s.particles);
   if (last && fits(last->impl(), options, terrain, s.particles.origin())) {
     s.phi = renew_field(s, making, last->impl(), hash, ground, renewal);
-    renewal.stale = widened(s.blocks, std::move(renewal.stale), 1);  // cells reach into the next block
-    // A block that is gone leaves `outside` behind.
-    for (std::size_t b = 0; b < s.blocks.size(); ++b)
-      for (std::size_t slot = 0; slot < 27 && !renewal.stale[b]; ++slot)
-        renewal.stale[b] = s.blocks.around(b)[slot] == kNone && last->impl().blocks.around(renewal.before[b])[slot] != kNone;
+    // Cells reach into the next block; a block that is gone leaves `outside` behind.
+    beside = widened(s.blocks, renewal.stale, 1);
+    edge.assign(s.blocks.size(), 0);
+    for (std::size_t b = 0; b < s.blocks.size(); ++b) {
+      for (std::size_t slot = 0; slot < 27 && !beside[b]; ++slot)
+        edge[b] = edge[b] || (s.blocks.around(b)[slot] == kNone && last->impl().blocks.around(renewal.before[b])[slot] != kNone);
+      beside[b] = beside[b] || edge[b];
+    }
     known.last = &last->impl().volumes;
     known.before = renewal.before;
-    known.stale = renewal.stale;
+    known.stale = beside;
   } else {
     s.phi = make_field(s, s.blocks, making, ground);
   }
   s.report.blocks = s.blocks.size();
   s.report.renewed = known.last ? renewal.stale_blocks : s.blocks.size();
-  Field lifted;
-  if (last) lifted = s.phi;
 
-  const auto voxels = [&](Real v) { return v / (s.voxel * s.voxel * s.voxel); };
+  Field lifted = std::move(s.phi);
+  const Real voxels = std::pow(s.voxel, -3);
+  Shift shift{0, -1};
   if (options.match_volume && volume > 0) {
     s.report.target = volume;
-    const float shift = matching_shift(s.blocks, s.outside, s.phi, ground.above, voxels(volume), d / 2, known);
-    s.report.shift = static_cast<Real>(shift) * s.voxel;
-    parallel_for(
-        s.phi.size(), [&](std::size_t i) { s.phi[i] -= shift; }, 1 << 14);
-    s.outside -= shift;
+    shift = matching_shift(s.blocks, s.outside, lifted, ground.above, volume * voxels, d / 2, known);
+    s.report.shift = static_cast<Real>(shift.shift) * s.voxel;
+    s.outside -= shift.shift;
   }
-  if (terrain)
-    parallel_for(
-        s.phi.size(),
-        [&](std::size_t i) {
-          if (ground.distance[i] < kNoGround) s.phi[i] = std::min(s.outside, std::max(s.phi[i], -ground.distance[i] - sink));
-        },
-        1 << 14);
+  s.phi.resize(lifted.size());
+  parallel_for(
+      s.phi.size(),
+      [&](std::size_t i) {
+        const float value = lifted[i] - shift.shift;
+        s.phi[i] = terrain && ground.distance[i] < kNoGround ? std::min(s.outside, std::max(value, -ground.distance[i] - sink)) : value;
+      },
+      1 << 14);
+
+  const Real least = options.drop_volume * std::pow(static_cast<Real>(d), 3);
   if (last) {
     SurfaceCache::Impl& c = last->impl();
+    const bool same_shift = known.last && c.shift == shift.shift;
+    if (same_shift) {
+      s.unchanged = renewal.before;
+      for (std::size_t b = 0; b < s.blocks.size(); ++b)
+        if (renewal.stale[b]) s.unchanged[b] = kNone;
+    }
+    std::vector<std::uint8_t> touched = drop_pieces(s.blocks, s.particles, least, s.phi, s.report, &c.pieces, s.unchanged);
+    for (std::size_t b = 0; b < s.unchanged.size(); ++b)
+      if (s.unchanged[b] != kNone && (touched[b] || c.touched[s.unchanged[b]])) s.unchanged[b] = kNone;
+    s.frame = ++c.frame;
     c.filled = true;
     c.options = options;
     c.terrain = terrain;
@@ -181,14 +196,33 @@ LevelSet build_level_set(const geometry::Points& points, Real volume, const geom
     c.x = s.particles.x();
     c.hash = std::move(hash);
     c.lifted = std::move(lifted);
-    c.distance = ground.distance;
-    c.above = ground.above;
+    c.distance = std::move(ground.distance);
     c.volumes = std::move(known.now);
+    c.shift = shift.shift;
+    c.touched = std::move(touched);
+  } else {
+    drop_pieces(s.blocks, s.particles, least, s.phi, s.report);
   }
-  drop_pieces(s.blocks, s.particles, options.drop_volume * std::pow(static_cast<Real>(d), 3), s.phi, s.report);
 
-  s.report.volume = enclosed(s.blocks, s.outside, s.phi, ground.above, 0) * std::pow(s.voxel, 3);
+  // Without ground, and where nothing was dropped, it is the volume that the shift was found for.
+  if (shift.volume >= 0 && !terrain && s.report.dropped_webs + s.report.dropped_pieces + s.report.filled_bubbles == 0) {
+    s.report.volume = shift.volume / voxels;
+    if (last) last->impl().final_volumes.clear();
+  } else {
+    KnownVolumes final;
+    if (last && !s.unchanged.empty()) {
+      for (std::size_t b = 0; b < s.blocks.size(); ++b) beside[b] = s.unchanged[b] == kNone;
+      beside = widened(s.blocks, std::move(beside), 1);
+      for (std::size_t b = 0; b < s.blocks.size(); ++b) beside[b] = beside[b] || edge[b];
+      final.last = &last->impl().final_volumes;
+      final.before = renewal.before;
+      final.stale = beside;
+    }
+    s.report.volume = enclosed(s.blocks, s.outside, s.phi, ground.above, final) / voxels;
+    if (last) last->impl().final_volumes = std::move(final.now);
+  }
   if (s.report.target > 0) s.report.residual = s.report.volume / s.report.target - 1;
+  if (last) last->impl().above = std::move(ground.above);
   COUNT("skin.voxels", s.phi.size());
   return surface;
 }

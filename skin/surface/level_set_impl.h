@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <span>
@@ -23,6 +25,8 @@ struct LevelSet::Impl {
   Field phi;  ///< the surface is its zero level; about a distance near it
   std::optional<geometry::Terrain> terrain;
   LevelSetReport report;
+  std::uint64_t frame = 0;       ///< of its SurfaceCache; 0: made without one
+  std::vector<Index> unchanged;  ///< of each block with the values of one of the frame before: which; kNone. Empty: none has
 
   Vec3 world(const Vec3& p) const { return particles.origin() + voxel * p; }
 };
@@ -60,14 +64,32 @@ struct KnownVolumes {
 /// Volume [voxels] where phi < shift and above ground, phi linear in six tetrahedra a cell: what a mesh through the
 /// same crossings encloses. above: GroundField::above, or empty.
 Real enclosed(const Blocks& blocks, float outside, const Field& phi, const Field& above, float shift);
+/// At shift 0, blocks that are known taken from there.
+Real enclosed(const Blocks& blocks, float outside, const Field& phi, const Field& above, KnownVolumes& known);
+struct Shift {
+  float shift;  ///< [voxels]
+  Real volume;  ///< [voxels] enclosed by then
+};
 /// The shift within +-most, in steps of 1 / kShiftSteps, at which enclosed() is the target as nearly as such steps allow; the nearer
 /// end when there is none.
 inline constexpr int kShiftSteps = 128;
-float matching_shift(const Blocks& blocks, float outside, const Field& phi, const Field& above, Real target, float most, KnownVolumes& known);
+Shift matching_shift(const Blocks& blocks, float outside, const Field& phi, const Field& above, Real target, float most, KnownVolumes& known);
+
+/// The face-connected sets of voxels on one side of the surface, within one block.
+struct BlockPieces {
+  std::vector<std::uint16_t> of;     // of each voxel; empty: the block is one set
+  std::vector<std::uint8_t> inside;  // of each set
+  /// Along each axis: which sets meet which of the next block's; met: there is one.
+  std::array<std::vector<std::array<std::uint16_t, 2>>, 3> meeting;
+  std::array<bool, 3> met{};
+  std::uint16_t at(std::size_t voxel) const { return of.empty() ? std::uint16_t{0} : of[voxel]; }
+};
 
 /// Turns inner voxels into outer ones where a face-connected set of them holds no particle (webs between particles) or is
-/// smaller than `least` [voxels], and closed bubbles smaller than that into inner ones.
-void drop_pieces(const Blocks& blocks, const ParticleGrid& particles, Real least, Field& phi, LevelSetReport& report);
+/// smaller than `least` [voxels], and closed bubbles smaller than that into inner ones. Returns the blocks that it changed.
+///   last, unchanged  pieces of the last frame, left for the next; of each block whose values are those of one then, which; kNone
+std::vector<std::uint8_t> drop_pieces(const Blocks& blocks, const ParticleGrid& particles, Real least, Field& phi, LevelSetReport& report,
+                                      std::vector<BlockPieces>* last = nullptr, std::span<const Index> unchanged = {});
 
 /// Distances to the zero level of phi, right to a twentieth of a voxel beside it and a fifth three voxels away, out to +-band and cut
 /// there; the zero level stays where it is to a twentieth. Voxels without a block are outside.

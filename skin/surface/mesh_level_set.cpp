@@ -36,7 +36,15 @@ void carry_attributes(const LevelSet::Impl& s, const std::vector<Vec3>& at, geom
 geometry::TriMesh mesh_level_set(const LevelSet& surface, SurfaceCache* last) {
   ZONE("skin.mesh");
   const LevelSet::Impl& s = surface.impl();
-  geometry::TriMesh mesh = iso_mesh(s.blocks, s.outside, s.phi, last ? &last->impl().mesh : nullptr);
+  geometry::TriMesh mesh;
+  if (last && s.frame > 0) {
+    SurfaceCache::Impl& c = last->impl();
+    const bool next = c.mesh_frame + 1 == s.frame;
+    mesh = iso_mesh(s.blocks, s.outside, s.phi, &c.mesh, next ? std::span<const Index>(s.unchanged) : std::span<const Index>());
+    c.mesh_frame = s.frame;
+  } else {
+    mesh = iso_mesh(s.blocks, s.outside, s.phi);
+  }
   const std::vector<Vec3> at = mesh.positions;
   for (Vec3& p : mesh.positions) p = s.world(p);
   carry_attributes(s, at, mesh);

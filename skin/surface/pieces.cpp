@@ -26,14 +26,6 @@ struct DisjointSets {
   }
 };
 
-/// The face-connected sets of voxels on one side of the surface, within one block.
-struct BlockPieces {
-  std::vector<std::uint16_t> of;     // of each voxel; empty: the block is one set
-  std::vector<std::uint8_t> inside;  // of each set
-  std::vector<std::array<Index, 2>> meeting;  // sets that meet those of the next block along an axis, in all blocks' numbers
-  std::uint16_t at(std::size_t voxel) const { return of.empty() ? std::uint16_t{0} : of[voxel]; }
-};
-
 /// Row by row along z: runs of voxels on one side, joined with those beside them in the two rows before.
 BlockPieces pieces_of(const float* phi) {
   constexpr std::size_t kRows = kSide * kSide;
@@ -103,22 +95,33 @@ BlockPieces pieces_of(const float* phi) {
 
 }  // namespace
 
-void drop_pieces(const Blocks& blocks, const ParticleGrid& particles, Real least, Field& phi, LevelSetReport& report) {
+std::vector<std::uint8_t> drop_pieces(const Blocks& blocks, const ParticleGrid& particles, Real least, Field& phi, LevelSetReport& report,
+                                      std::vector<BlockPieces>* last, std::span<const Index> unchanged) {
   ZONE("skin.pieces");
   const std::size_t n = blocks.size();
   std::vector<BlockPieces> in(n);
   parallel_for(
-      n, [&](std::size_t b) { in[b] = pieces_of(&phi[b * kVoxels]); }, 16);
+      n,
+      [&](std::size_t b) {
+        if (!unchanged.empty() && unchanged[b] != kNone) in[b] = std::move((*last)[unchanged[b]]);
+        else in[b] = pieces_of(&phi[b * kVoxels]);
+      },
+      16);
   std::vector<Index> first(n + 1, 0);
   for (std::size_t b = 0; b < n; ++b) first[b + 1] = first[b] + static_cast<Index>(in[b].inside.size());
 
   // Sets of neighbouring blocks that meet in a face.
+  constexpr std::size_t kNextSlot[3] = {22, 16, 14}, kStep[3] = {64, 8, 1};  // the next block along each axis
   parallel_for(
       n,
       [&](std::size_t b) {
-        constexpr std::size_t kSlot[3] = {22, 16, 14}, kStep[3] = {64, 8, 1};  // the next block along each axis
-        for (int axis = 0; axis < 3; ++axis) {
-          const Index other = blocks.around(b)[kSlot[axis]];
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          const Index other = blocks.around(b)[kNextSlot[axis]];
+          auto& meeting = in[b].meeting[axis];
+          const auto kept = [&](std::size_t k) { return !unchanged.empty() && unchanged[k] != kNone; };
+          if (other != kNone && kept(b) && kept(other) && in[b].met[axis]) continue;
+          meeting.clear();
+          in[b].met[axis] = other != kNone;
           if (other == kNone) continue;
           const std::size_t step = kStep[axis], others[2] = {axis == 0 ? 8u : 64u, axis == 2 ? 8u : 1u};
           const std::size_t voxels = in[b].of.empty() && in[other].of.empty() ? 1 : kSide * kSide;
@@ -126,15 +129,16 @@ void drop_pieces(const Blocks& blocks, const ParticleGrid& particles, Real least
             const std::size_t v = r / kSide * others[0] + r % kSide * others[1];
             const std::uint16_t mine = in[b].at(v + 7 * step), theirs = in[other].at(v);
             if (in[b].inside[mine] != in[other].inside[theirs]) continue;
-            const std::array<Index, 2> pair = {first[b] + Index{mine}, first[other] + Index{theirs}};
-            if (in[b].meeting.empty() || in[b].meeting.back() != pair) in[b].meeting.push_back(pair);
+            const std::array<std::uint16_t, 2> pair = {mine, theirs};
+            if (meeting.empty() || meeting.back() != pair) meeting.push_back(pair);
           }
         }
       },
       16);
   DisjointSets sets(first[n]);
-  for (const BlockPieces& block : in)
-    for (const auto& [a, c] : block.meeting) sets.join(a, c);
+  for (std::size_t b = 0; b < n; ++b)
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      for (const auto& [mine, theirs] : in[b].meeting[axis]) sets.join(first[b] + mine, first[blocks.around(b)[kNextSlot[axis]]] + theirs);
 
   struct Piece {
     bool settled = false;  // a voxel at a corner of a particle's cell
@@ -159,7 +163,7 @@ void drop_pieces(const Blocks& blocks, const ParticleGrid& particles, Real least
       for (std::size_t v = 0; v < kVoxels; ++v) volume[in[b].at(v)] += std::min(0.5 + static_cast<Real>(std::abs(phi[b * kVoxels + v])), 1.0);
       for (std::size_t k = 0; k < volume.size(); ++k) piece(static_cast<std::uint16_t>(k)).volume += volume[k];
       for (std::size_t face = 0; face < 6; ++face) {
-        constexpr std::size_t kSlot[6] = {4, 22, 10, 16, 12, 14}, kStep[3] = {64, 8, 1};  // beside the block, by axis
+        constexpr std::size_t kSlot[6] = {4, 22, 10, 16, 12, 14};  // beside the block, by axis
         if (blocks.around(b)[kSlot[face]] != kNone) continue;
         for (std::size_t v = 0; v < kVoxels; ++v) {
           const std::uint16_t k = in[b].at(v);
@@ -178,10 +182,12 @@ void drop_pieces(const Blocks& blocks, const ParticleGrid& particles, Real least
       dropped[name] = 1;
       if (root == name) ++(!in[b].inside[k] ? report.filled_bubbles : web ? report.dropped_webs : report.dropped_pieces);
     }
+  std::vector<std::uint8_t> touched(n, 0);
   parallel_for(
       n,
       [&](std::size_t b) {
         if (std::none_of(dropped.begin() + first[b], dropped.begin() + first[b + 1], [](std::uint8_t d) { return d != 0; })) return;
+        touched[b] = 1;
         for (std::size_t v = 0; v < kVoxels; ++v) {
           const std::uint16_t k = in[b].at(v);
           float& value = phi[b * kVoxels + v];
@@ -189,6 +195,8 @@ void drop_pieces(const Blocks& blocks, const ParticleGrid& particles, Real least
         }
       },
       64);
+  if (last) *last = std::move(in);
+  return touched;
 }
 
 }  // namespace effuse::skin

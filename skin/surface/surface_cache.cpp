@@ -14,6 +14,30 @@ SurfaceCache::~SurfaceCache() = default;
 SurfaceCache::SurfaceCache(SurfaceCache&&) noexcept = default;
 SurfaceCache& SurfaceCache::operator=(SurfaceCache&&) noexcept = default;
 
+namespace {
+
+/// Open addressing; 0 is taken for free, so that a particle of hash 0 counts as moved.
+class HashSet {
+ public:
+  explicit HashSet(const std::vector<std::uint64_t>& hashes) : slots_(std::bit_ceil(2 * hashes.size() + 2), 0) {
+    for (const std::uint64_t h : hashes) {
+      std::size_t s = h & (slots_.size() - 1);
+      while (slots_[s] != 0 && slots_[s] != h) s = (s + 1) & (slots_.size() - 1);
+      slots_[s] = h;
+    }
+  }
+  bool has(std::uint64_t h) const {
+    std::size_t s = h & (slots_.size() - 1);
+    while (slots_[s] != 0 && slots_[s] != h) s = (s + 1) & (slots_.size() - 1);
+    return slots_[s] == h && h != 0;
+  }
+
+ private:
+  std::vector<std::uint64_t> slots_;
+};
+
+}  // namespace
+
 std::vector<std::uint64_t> particle_hashes(const ParticleGrid& particles) {
   std::vector<std::uint64_t> hash(particles.size());
   parallel_for(
@@ -58,14 +82,12 @@ Renewal find_stale(const SurfaceCache::Impl& last, const ParticleGrid& particles
       1024);
 
   // Particles of one frame only.
-  std::vector<std::uint64_t> now = hash, then = last.hash;
-  std::sort(now.begin(), now.end());
-  std::sort(then.begin(), then.end());
-  const auto mark = [&](const std::vector<Vec3>& x, const std::vector<std::uint64_t>& own, const std::vector<std::uint64_t>& others) {
+  const HashSet then(last.hash), now(hash);
+  const auto mark = [&](const std::vector<Vec3>& x, const std::vector<std::uint64_t>& own, const HashSet& others) {
     KeyTable table;
     std::vector<Box3> moved;  // of each block's
     for (std::size_t i = 0; i < x.size(); ++i) {
-      if (std::binary_search(others.begin(), others.end(), own[i])) continue;
+      if (others.has(own[i])) continue;
       const auto block = [&](int a) { return static_cast<int>(std::floor(x[i][a] / kSide)); };
       const Index n = table.number(pack(block(0), block(1), block(2)));
       if (n == moved.size()) moved.emplace_back();

@@ -17,12 +17,17 @@ struct SurfaceCache::Impl {
   Vec3 origin = Vec3::Zero();
 
   Blocks blocks;
-  std::vector<std::uint64_t> particles;  // of each block: a hash of those in it
-  std::vector<Vec3> x;                   // of all, sorted [voxels]
+  std::vector<Vec3> x;                   // of all particles, sorted [voxels]
   std::vector<std::uint64_t> hash;       // of each of those
   Field lifted, distance, above;         // before the shift; the ground's two only with a terrain
   std::map<int, std::vector<Real>> volumes;  // by shift, in steps: of each block
+  std::map<int, std::vector<Real>> final_volumes;  // of the surface as it was handed out
 
+  float shift = 0;
+  std::vector<BlockPieces> pieces;
+  std::vector<std::uint8_t> touched;  // blocks in which pieces were dropped
+
+  std::uint64_t frame = 0, mesh_frame = 0;  // the last one built, meshed
   MeshCache mesh;
 };
 

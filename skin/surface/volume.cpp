@@ -52,16 +52,10 @@ EFFUSE_CLONES void corner_sums(float* v) {
 /// Volumes enclosed by one field at different shifts.
 class Enclosed {
  public:
-  Enclosed(const Blocks& blocks, float outside, const Field& phi, const Field& above) : blocks_(blocks), outside_(outside), phi_(phi), above_(above), range_(blocks.size()), full_(blocks.size(), -1) {
-    parallel_for(
-        blocks.size(),
-        [&](std::size_t b) {
-          const auto [low, high] = std::minmax_element(&phi[b * kVoxels], &phi[b * kVoxels] + kVoxels);
-          range_[b] = {*low, *high};
-        },
-        64);
-  }
+  Enclosed(const Blocks& blocks, float outside, const Field& phi, const Field& above)
+      : blocks_(blocks), outside_(outside), phi_(phi), above_(above), full_(blocks.size(), -1) {}
   Real operator()(float shift) {
+    find_ranges();
     return parallel_sum(
         blocks_.size(), Real{0}, [&](std::size_t b) { return of_block(b, shift); }, 32);
   }
@@ -73,6 +67,7 @@ class Enclosed {
     std::vector<Real>& now = known.now[steps];
     now.resize(blocks_.size());
     const float shift = static_cast<float>(steps) / kShiftSteps;
+    if (!last) find_ranges();
     return parallel_sum(
         blocks_.size(), Real{0},
         [&](std::size_t b) { return now[b] = last && !known.stale[b] ? (*last)[known.before[b]] : of_block(b, shift); }, 32);
@@ -82,13 +77,26 @@ class Enclosed {
   struct Range {
     float low, high;
   };
+  Range range_of(std::size_t b) const {
+    if (!range_.empty()) return range_[b];
+    const auto [low, high] = std::minmax_element(&phi_[b * kVoxels], &phi_[b * kVoxels] + kVoxels);
+    return {*low, *high};
+  }
+  /// Once for all, where most will be asked for.
+  void find_ranges() {
+    if (!range_.empty()) return;
+    std::vector<Range> ranges(blocks_.size());
+    parallel_for(
+        ranges.size(), [&](std::size_t b) { ranges[b] = range_of(b); }, 64);
+    range_ = std::move(ranges);
+  }
 
   /// Of the cells that begin at the block's voxels.
   Real of_block(std::size_t b, float shift) {
-    Range range = range_[b];
+    Range range = range_of(b);
     for (const std::size_t slot : {14u, 16u, 17u, 22u, 23u, 25u, 26u}) {
       const Index other = blocks_.around(b)[slot];
-      const Range beyond = other == kNone ? Range{outside_, outside_} : range_[other];
+      const Range beyond = other == kNone ? Range{outside_, outside_} : range_of(other);
       range = {std::min(range.low, beyond.low), std::max(range.high, beyond.high)};
     }
     if (range.low >= shift) return 0;
@@ -119,7 +127,7 @@ class Enclosed {
   const Blocks& blocks_;
   float outside_;
   const Field &phi_, &above_;
-  std::vector<Range> range_;  // of each block's values
+  std::vector<Range> range_;  // of each block's values, once found
   std::vector<float> full_;   // a block's volume when all of it is inside; -1: not asked yet
 };
 
@@ -129,7 +137,11 @@ Real enclosed(const Blocks& blocks, float outside, const Field& phi, const Field
   return Enclosed(blocks, outside, phi, above)(shift);
 }
 
-float matching_shift(const Blocks& blocks, float outside, const Field& phi, const Field& above, Real target, float most, KnownVolumes& known) {
+Real enclosed(const Blocks& blocks, float outside, const Field& phi, const Field& above, KnownVolumes& known) {
+  return Enclosed(blocks, outside, phi, above)(0, known);
+}
+
+Shift matching_shift(const Blocks& blocks, float outside, const Field& phi, const Field& above, Real target, float most, KnownVolumes& known) {
   ZONE("skin.match_volume");
   Enclosed volume(blocks, outside, phi, above);
   // In whole steps, so that a frame of which little has changed is shifted as the one before.
@@ -174,7 +186,7 @@ float matching_shift(const Blocks& blocks, float outside, const Field& phi, cons
       stayed = -1;
     }
   }
-  return static_cast<float>(best) / kShiftSteps;
+  return {static_cast<float>(best) / kShiftSteps, (at_best + 1) * target};
 }
 
 Real volume_above_ground(const LevelSet& surface, const geometry::Terrain* terrain) {

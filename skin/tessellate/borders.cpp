@@ -15,6 +15,7 @@ namespace {
 using geometry::Triangle;
 
 constexpr Real kBent = 1.3;       // a border this much longer than the way between its ends gets a node on its way
+constexpr Real kTurned = 0.2;     // so does one at whose ends the surface's normals have no more than this in common
 constexpr Real kFarthest = 0.35;  // [spacings] a node may be from the triangle where its cells meet
 
 /// Border between two ends before it is made of straight ones.
@@ -196,6 +197,10 @@ Borders trace_borders(const LabelledMesh& mesh, const Cells& cells, const Region
   for (std::size_t e = 1; e < ends.size(); ++e)
     if (ends[e].first == ends[e - 1].first) twin[ends[e].second] = twin[ends[e - 1].second] = 1;
 
+  const auto turned = [&](const Chain& chain) {
+    return walk.normal(result.nodes[chain.from].spot).dot(walk.normal(result.nodes[chain.to].spot)) < kTurned;
+  };
+
   std::vector<Real> along;
   for (Index c = 0; c < chains.size(); ++c) {
     const Chain& chain = chains[c];
@@ -217,7 +222,7 @@ Borders trace_borders(const LabelledMesh& mesh, const Cells& cells, const Region
     if (closed)
       added = 3;
     else if (const Real straight = (end - result.nodes[chain.from].spot.x).norm();
-             twin[c] || (length > kBent * straight && length > 0.3 * regions.spacing()))
+             twin[c] || (length > kBent * straight && length > 0.3 * regions.spacing()) || turned(chain))
       added = 1;
 
     Index from = chain.from;

@@ -27,7 +27,7 @@ struct Borders {
 };
 
 /// Three cells in a triangle are a node; borders run through the middles of triangles with two cells from node to node. Nodes are
-/// added on the way of closed borders (three), of borders with the same two ends (one each) and of bent ones, so that each cell
+/// added on the way of closed borders (three), of borders with the same two ends (one each) and of bent ones (by their length, or round an edge of the surface), so that each cell
 /// has three nodes or more, and no two borders the same ends.
 /// Nodes of three particles are put where the surface is as far from all three, if no fourth is nearer there.
 Borders trace_borders(const LabelledMesh& mesh, const Cells& cells, const Regions& regions, std::span<const Vec3> site,

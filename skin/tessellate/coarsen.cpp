@@ -33,21 +33,28 @@ Real shape(const Vec3& a, const Vec3& b, const Vec3& c) {
 
 class Coarsener {
  public:
-  Coarsener(TriMesh& mesh, const CoarsenOptions& options)
+  Coarsener(TriMesh& mesh, const CoarsenOptions& options, std::span<const Index> label)
       : mesh_(mesh),
         options_(options),
+        label_(label),
         stars_(mesh.positions.size(), mesh.triangles),
         error_(mesh.triangles.size(), 0),
         gone_(mesh.triangles.size(), 0),
         taken_out_(mesh.positions.size(), 0),
         pass_of_(mesh.positions.size(), -1),
-        least_sine_(std::sin(options.min_angle * kPi / 180)) {}
+        least_sine_(std::sin(options.min_angle * kPi / 180)) {
+    if (label.empty()) return;
+    left_.assign(static_cast<std::size_t>(*std::max_element(label.begin(), label.end())) + 1, 0);
+    for (const Index l : label) ++left_[l];
+  }
 
   std::size_t pass(int number, Real bound) {
     std::size_t removed = 0;
     for (Index v = 0; v < mesh_.positions.size(); ++v) {
       // One around a place in a pass: vertices go evenly.
-      if (taken_out_[v] || pass_of_[v] == number || !look_around(v)) continue;
+      if (taken_out_[v] || pass_of_[v] == number) continue;
+      if (!label_.empty() && left_[label_[v]] == 1) continue;
+      if (!look_around(v)) continue;
       Index into = kNone;
       Real least = bound - most_;
       for (std::size_t k = 0; k < ring_.size(); ++k)
@@ -58,6 +65,7 @@ class Coarsener {
       if (into == kNone) continue;
       for (const Index w : ring_) pass_of_[w] = number;
       take_out(v, ring_[into], most_ + least);
+      if (!label_.empty()) --left_[label_[v]];
       ++removed;
     }
     return removed;
@@ -227,6 +235,8 @@ class Coarsener {
 
   TriMesh& mesh_;
   const CoarsenOptions& options_;
+  std::span<const Index> label_;
+  std::vector<Index> left_;  // vertices of each label
   Stars stars_;
   std::vector<Real> error_;                     // of each triangle
   std::vector<std::uint8_t> gone_, taken_out_;  // triangles, vertices
@@ -243,12 +253,13 @@ class Coarsener {
 
 }  // namespace
 
-CoarsenReport coarsen(TriMesh& mesh, const CoarsenOptions& options) {
+CoarsenReport coarsen(TriMesh& mesh, const CoarsenOptions& options, std::span<const Index> label) {
   ZONE("skin.coarsen");
   CHECK_GT(options.error, 0);
   CHECK_GE(options.longest, 0);
+  if (!label.empty()) CHECK_EQ(label.size(), mesh.positions.size());
   number_edges(mesh.triangles, mesh.positions.size(), [](Index) { return true; });  // checks
-  Coarsener coarsener(mesh, options);
+  Coarsener coarsener(mesh, options, label);
   std::size_t left = mesh.positions.size();
   for (int pass = 0; pass < kPasses + kLastPasses; ++pass) {
     const std::size_t removed = coarsener.pass(pass, options.error * std::min(pass + 1, kPasses) / kPasses);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "geometry/mesh/tri_mesh.h"
@@ -27,9 +28,10 @@ struct CoarsenReport {
 /// (checked for each), so that their distance is at most the largest difference of their heights, which is at the vertex or where an old
 /// edge crosses a new one. The differences of one step after the other are added up for each triangle: a bound, of which the true
 /// distance is 0.7 to 1. At `error` = 0.1 particle spacings and a voxel of half a spacing, 3.5 to 5.5 times fewer triangles.
-///   mesh  as mesh_level_set gives it; two triangles an edge, of opposite direction (checked), one fan a vertex (checked)
+///   mesh   as mesh_level_set gives it; two triangles an edge, of opposite direction (checked), one fan a vertex (checked)
+///   label  of each vertex, from 0 on, or none: the last vertex of a label stays, so that no region is lost
 /// Serial; the same bits always. 2 us a vertex of the fine mesh.
 /// Source of the bound: Cohen, Manocha & Olano 1997, Simplifying polygonal models using successive mappings, Visualization '97.
-CoarsenReport coarsen(geometry::TriMesh& mesh, const CoarsenOptions& options);
+CoarsenReport coarsen(geometry::TriMesh& mesh, const CoarsenOptions& options, std::span<const Index> label = {});
 
 }  // namespace effuse::skin

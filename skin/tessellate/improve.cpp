@@ -55,10 +55,12 @@ Real triangle_quality(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& u
   const Real area = n.norm(), along = n.dot(up);
   const Real length = up.norm();
   if (!(area > 0)) return 0;
-  // Less than 6 degrees from edge-on counts as folded: there the surface and the triangle do not agree.
-  if (along <= 0.1 * area * length) return length > 0 ? along / (area * length) - 1 : -1;
   const Real x = ab.squaredNorm(), y = bc.squaredNorm(), z = ca.squaredNorm();
-  return area * std::sqrt(std::min({x, y, z}) / (x * y * z));
+  const Real sine = area * std::sqrt(std::min({x, y, z}) / (x * y * z));
+  // Less than 6 degrees from edge-on counts as folded: there the surface and the triangle do not agree. Of folded ones the thinner is the
+  // better: on the way out they have no area.
+  if (along <= 0.1 * area * length) return length > 0 ? sine * along / (area * length) - 1 : -1;
+  return sine;
 }
 
 std::size_t merge_short_borders(Fans& fans, const SurfaceWalk& walk, Real length, Real only_below) {

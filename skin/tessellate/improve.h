@@ -17,8 +17,8 @@ struct Fans {
   std::vector<geometry::Triangle> triangles;
 };
 
-/// Sine of a triangle's least angle, 0 .. sin 60 deg; where it looks away from `up` (any length), below 0: -1 plus the cosine
-/// between them.
+/// Sine of a triangle's least angle, 0 .. sin 60 deg; where it looks away from `up` (any length), about -1 or less: -1 plus that sine times
+/// the cosine between them.
 Real triangle_quality(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& up);
 
 /// Shrinks borders (edges between nodes) shorter than `length` [m] to a node, shortest first, where the mesh stays manifold (the

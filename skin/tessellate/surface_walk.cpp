@@ -3,6 +3,8 @@
 #include <numeric>
 #include <span>
 
+#include "geometry/base/parallel.h"
+#include "geometry/base/zones.h"
 #include "geometry/mesh/measure.h"
 #include "geometry/query/closest_point.h"
 
@@ -69,6 +71,24 @@ Vec3 SurfaceWalk::normal(const Spot& spot) const {
   const Vec3 n = spot.weights[0] * normals[t[0]] + spot.weights[1] * normals[t[1]] + spot.weights[2] * normals[t[2]];
   const Real length = n.norm();
   return length > 0 ? Vec3(n / length) : normals[t[0]];
+}
+
+void carry_over(const geometry::TriMesh& surface, const std::vector<Spot>& spots, geometry::TriMesh& mesh) {
+  ZONE("skin.carry");
+  const std::size_t n = spots.size();
+  for (const auto& [name, from] : surface.attributes) {
+    geometry::VertexAttribute& to = mesh.attributes[name];
+    const auto width = static_cast<std::size_t>(from.width);
+    to.width = from.width;
+    to.values.resize(n * width);
+    parallel_for(n, [&](std::size_t v) {
+      const Triangle& t = surface.triangles[spots[v].triangle];
+      const Vec3& w = spots[v].weights;
+      for (std::size_t k = 0; k < width; ++k)
+        to.values[v * width + k] = static_cast<float>(w[0] * from.values[t[0] * width + k] + w[1] * from.values[t[1] * width + k] +
+                                                      w[2] * from.values[t[2] * width + k]);
+    });
+  }
 }
 
 }  // namespace effuse::skin

@@ -31,4 +31,7 @@ class SurfaceWalk {
   std::vector<Vec3> normals_;          // if the mesh has none
 };
 
+/// Gives mesh the surface's attributes at the spots, one for each of its vertices: linear in the surface's triangles.
+void carry_over(const geometry::TriMesh& surface, const std::vector<Spot>& spots, geometry::TriMesh& mesh);
+
 }  // namespace effuse::skin

@@ -19,6 +19,8 @@ using geometry::Triangle;
 using geometry::TriMesh;
 
 constexpr int kSteps = 8;     // from a centre's first place to the middle of its fan
+constexpr Real kUnfolded = 2;   // [deg] enough for a triangle that was folded
+constexpr Real kFarther = 0.8;  // [spacings] that its corners may move
 constexpr Real kLongest = 3;  // a border of a folded triangle that shrinks, in options.merge
 
 /// A triangle of the surface at each vertex of the labelled mesh that a cell wants to begin at.
@@ -55,26 +57,31 @@ void place_centers(const LabelledMesh& mesh, const Cells& cells, std::span<const
           }
           return least;
         };
+        // The border's middle, by length, so that nodes may come and go; and how far its nodes are from there.
+        Vec3 middle = Vec3::Zero();
+        Real border = 0, reach = 0;
+        for (const Index t : fan) {
+          const Vec3 &p = fans.spots[fans.triangles[t][1]].x, &q = fans.spots[fans.triangles[t][2]].x;
+          const Real length = (p - q).norm();
+          border += length;
+          middle += length * (p + q) / 2;
+        }
+        middle = border > 0 ? Vec3(middle / border) : fans.spots[fans.triangles[fan[0]][1]].x;
+        for (const Index t : fan) reach = std::max(reach, (fans.spots[fans.triangles[t][1]].x - middle).norm());
         Spot best;
         Real most = -10;
-        if (cells.whole[c]) {
+        bool own_place = cells.whole[c];
+        if (own_place) {
           best = walk.nearest(site[cells.particle[c]], start[c]);
-          most = worst(best);
+          // Of a region in two pieces, on a sheet's rim say, the particle may be nearest to the other one.
+          own_place = (best.x - middle).norm() <= reach;
+          if (own_place) most = worst(best);
         }
         if (most < wanted) {
-          // Towards the middle of the border, by length, so that nodes may come and go; no farther than it takes.
-          Vec3 middle = Vec3::Zero();
-          Real border = 0;
-          for (const Index t : fan) {
-            const Vec3 &p = fans.spots[fans.triangles[t][1]].x, &q = fans.spots[fans.triangles[t][2]].x;
-            const Real length = (p - q).norm();
-            border += length;
-            middle += length * (p + q) / 2;
-          }
-          middle = border > 0 ? Vec3(middle / border) : fans.spots[fans.triangles[fan[0]][1]].x;
-          const Vec3 from = cells.whole[c] ? best.x : middle;
-          const Index first = cells.whole[c] ? best.triangle : start[c];
-          for (int step = cells.whole[c] ? 1 : kSteps; step <= kSteps && most < wanted; ++step) {
+          // Towards the middle, no farther than it takes.
+          const Vec3 from = own_place ? best.x : middle;
+          const Index first = own_place ? best.triangle : start[c];
+          for (int step = own_place ? 1 : kSteps; step <= kSteps && most < wanted; ++step) {
             const Spot spot = walk.nearest(from + static_cast<Real>(step) / kSteps * (middle - from), first);
             const Real q = worst(spot);
             if (q <= most && !(step == kSteps && most <= 0)) continue;
@@ -86,27 +93,6 @@ void place_centers(const LabelledMesh& mesh, const Cells& cells, std::span<const
         fans.up[c] = walk.normal(best);
       },
       64);
-}
-
-/// Positions and attributes of the surface at the spots.
-void carry_over(const TriMesh& surface, const std::vector<Spot>& spots, TriMesh& mesh) {
-  ZONE("skin.carry");
-  const std::size_t n = spots.size();
-  mesh.positions.resize(n);
-  parallel_for(n, [&](std::size_t v) { mesh.positions[v] = spots[v].x; });
-  for (const auto& [name, from] : surface.attributes) {
-    geometry::VertexAttribute& to = mesh.attributes[name];
-    const auto width = static_cast<std::size_t>(from.width);
-    to.width = from.width;
-    to.values.resize(n * width);
-    parallel_for(n, [&](std::size_t v) {
-      const Triangle& t = surface.triangles[spots[v].triangle];
-      const Vec3& w = spots[v].weights;
-      for (std::size_t k = 0; k < width; ++k)
-        to.values[v * width + k] = static_cast<float>(w[0] * from.values[t[0] * width + k] + w[1] * from.values[t[1] * width + k] +
-                                                      w[2] * from.values[t[2] * width + k]);
-    });
-  }
 }
 
 void measure(const Fans& fans, VoronoiReport& report) {
@@ -164,6 +150,11 @@ Tessellation tessellate_voronoi(const TriMesh& surface, const Regions& regions, 
     result.report.merged += more;
     result.report.moved += move_for_angles(fans, walk, spacing, options);
   }
+  // What is still folded may go farther: its nodes are on the wrong side of one another.
+  VoronoiOptions unfold = options;
+  unfold.min_angle = std::min(options.min_angle, kUnfolded);
+  unfold.wander = std::max(options.wander, kFarther);
+  result.report.moved += move_for_angles(fans, walk, spacing, unfold);
 
   // Regions: the particles that have a cell, in rising order.
   result.particle = cells.particle;
@@ -179,6 +170,12 @@ Tessellation tessellate_voronoi(const TriMesh& surface, const Regions& regions, 
   result.region.reserve(fans.triangles.size());
   for (const Triangle& t : fans.triangles) result.region.push_back(region_of[t[0]]);
 
+  result.mesh.positions.resize(fans.spots.size());
+  result.on.resize(fans.spots.size());
+  for (std::size_t v = 0; v < fans.spots.size(); ++v) {
+    result.mesh.positions[v] = fans.spots[v].x;
+    result.on[v] = fans.spots[v].triangle;
+  }
   carry_over(surface, fans.spots, result.mesh);
   result.report.regions = result.particle.size();
   result.report.fans = cells.size();

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "geometry/mesh/tri_mesh.h"
+#include "skin/tessellate/labels.h"
 
 /// Meshes for Blender, Houdini, ParaView and web viewers. Our own writers, because the libraries' drop the attributes
 /// (temperature, velocity, crust) that a shader needs, or write files that are wrong.
@@ -23,6 +24,15 @@ using Metadata = std::vector<std::pair<std::string, std::string>>;
 /// "color", every other attribute as float scalars of its name (velocity_x, ...). Faces: `list uchar uint
 /// vertex_indices`. Metadata as comments, all before the first element (some readers refuse later ones).
 void write_ply(const std::filesystem::path& file, const geometry::TriMesh& mesh, const Metadata& metadata = {});
+
+/// The same with the regions: of each vertex, and of each triangle where labels has them, the id of the particle whose region it is
+/// in as `uint region`, its lower 32 bits; and where there are ids of more than that, `uint region_high`: id = region + 2^32 region_high.
+/// PLY's readers know whole numbers of up to 32 bits (most refuse a file with longer ones). Many keep what they read as float, which is exact
+/// up to 2^24 (Blender, and effuse's own reader): where there are larger ids, a comment in the file says so. Blender reads
+/// a vertex's properties and skips those of a face. OBJ and GLB leave regions out: the one has no place for them, the other's
+/// attributes are no whole numbers beyond 16 bits. Sizes must agree (checked).
+void write_skin_ply(const std::filesystem::path& file, const geometry::TriMesh& mesh, const RegionLabels& labels,
+                    const Metadata& metadata = {});
 
 /// OBJ with normals and `v x y z r g b` (sRGB), z up (in Blender: forward Y, up Z), nine digits: positions to 5e-9 of
 /// the largest coordinate, in one number of decimals for the file. OBJ has no place for other attributes.

@@ -292,11 +292,11 @@ TEST_F(ProgramTest, KeepsARunUnlessForcedAndARunOfAnotherSceneFromBeingResumed) 
 
 TEST_F(ProgramTest, AFullDiskEndsTheRunWithCodeFiveAndNoBrokenFile) {
   const fs::path out = folder_ / "out";
-  const Outcome outcome = wait(start(run_gully(out, 12), 60'000));
+  const Outcome outcome = wait(start(run_gully(out, 12), 30'000));
   EXPECT_EQ(outcome.code, 5) << outcome.err;
   for (const auto& [name, bytes] : frame_files(out)) {
     EXPECT_EQ(name.find(".part"), std::string::npos) << name;
-    EXPECT_LE(bytes.size(), 60'000u) << name;
+    EXPECT_LE(bytes.size(), 30'000u) << name;
   }
 }
 

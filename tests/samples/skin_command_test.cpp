@@ -296,6 +296,11 @@ TEST_F(SkinCommandTest, BrokenFilesAndWrongNamesAreExitCodeTwoAndLeaveNothing) {
       {{"good.xyz", "-o", "a.ply", "-r", "-1"}, "--particle-radius"},
       {{"good.xyz", "-o", "a.ply", "--normals=off"}, "always written with normals"},
       {{"good.xyz", "-o", "a.ply", "--particle-aabb-min", "0", "0", "0"}, "go together"},
+      {{"good.xyz", "-o", "a.ply", "--tessellation", "marching"}, "--tessellation"},
+      {{"good.xyz", "-o", "a.ply", "--tessellation", "voronoi", "--coarsen", "0.1"}, "--coarsen goes with --tessellation levelset"},
+      {{"good.xyz", "-o", "a.ply", "--coarsen", "nan"}, "--coarsen"},
+      {{"good.xyz", "-o", "a.ply", "--terrain", "none.asc"}, "error: none.asc: no such file"},
+      {{"good.xyz", "-o", "a.ply", "--terrain", "bad.xyz", "--up", "y"}, "--terrain is z up"},
       {{"good.xyz", "-o", "a.ply", "--particle-aabb-min", "0", "0", "0", "--particle-aabb-max", "1", "-1", "1"}, "is not below"},
   };
   for (const Case& c : cases) {
@@ -317,7 +322,7 @@ TEST_F(SkinCommandTest, AFrameWithoutParticlesIsAnEmptyMesh) {
   write("a.0002.csv", "x,y,z,radius\n0,0,0,0.5\n");
   const Outcome outcome = skin({"a.####.csv", "-o", "m.####.ply", "-o", "m.####.glb", "-o", "m.####.vdb", "--check"});
   ASSERT_EQ(outcome.code, 0) << outcome.out << outcome.err;
-  EXPECT_EQ(mesh("m.0002.ply").attributes.size(), 0u);
+  EXPECT_EQ(mesh("m.0002.ply").attributes.size(), 1u) << "region alone";
   EXPECT_GT(mesh("m.0002.ply").triangles.size(), 8u);
   for (const char* name : {"m.0001.ply", "m.0001.glb", "m.0001.vdb"}) EXPECT_TRUE(fs::exists(folder_ / name)) << name;
   EXPECT_TRUE(contains(read_file(folder_ / "m.0001.ply"), "element face 0\n"));
@@ -334,6 +339,108 @@ TEST_F(SkinCommandTest, ABoxCropsParticlesAndUpTurnsGlbOnly) {
   EXPECT_GT(geometry::bounds(mesh("z.glb")).min().y(), 9);
   EXPECT_GT(geometry::bounds(mesh("y.glb")).min().z(), 9);
   EXPECT_GT(geometry::signed_volume(mesh("y.glb")), 0);
+}
+
+/// 10 x 10 x 4 particles of radius 0.5 with ids from `first` on.
+std::string numbered_block(std::uint64_t first) {
+  std::string block = "x,y,z,radius,id\n";
+  for (std::uint64_t n = 0; n < 400; ++n) block += fmt::format("{},{},{},0.5,{}\n", n % 10, n / 10 % 10, n / 100, first + n);
+  return block;
+}
+
+TEST_F(SkinCommandTest, BothTessellationsCarryTheParticlesIds) {
+  write("block.csv", numbered_block(1000));
+  for (const std::string kind : {"levelset", "voronoi"}) {
+    const Outcome outcome = skin({"block.csv", "-o", "skin.ply", "--tessellation", kind, "--check", "--json"});
+    ASSERT_EQ(outcome.code, 0) << outcome.out << outcome.err;
+    const json j = json::parse(outcome.out).at("frames").at(0);
+    // The inner 8 x 8 x 2 are not on the surface; of the others each has its region.
+    EXPECT_EQ(j.at("regions"), 400 - 128);
+    EXPECT_LE(j.at("thin_triangles_share").get<double>(), 0.005);
+    const TriMesh found = mesh("skin.ply");
+    // Fans a spacing wide round off the block's edges.
+    EXPECT_NEAR(geometry::signed_volume(found), 400, (kind == "levelset" ? 0.02 : 0.03) * 400);
+    const std::vector<float>& region = found.attributes.at("region").values;
+    for (std::size_t v = 0; v < region.size(); ++v) {
+      const int n = static_cast<int>(region[v]) - 1000;
+      ASSERT_TRUE(n >= 0 && n < 400);
+      EXPECT_LT((found.positions[v] - Vec3(n % 10, n / 10 % 10, n / 100)).norm(), kind == "levelset" ? 1.0 : 1.2);
+    }
+    EXPECT_EQ(contains(read_file(folder_ / "skin.ply"), "vertex_indices\nproperty uint region\n"), kind == "voronoi");
+  }
+  // Ids that a float would round, and such as 32 bits do not hold.
+  write("block.csv", numbered_block(20'000'001));
+  ASSERT_EQ(skin({"block.csv", "-o", "skin.ply"}).code, 0);
+  EXPECT_TRUE(contains(read_file(folder_ / "skin.ply"), "comment region: "));
+  write("block.csv", numbered_block(5'000'000'000));
+  ASSERT_EQ(skin({"block.csv", "-o", "skin.ply"}).code, 0);
+  EXPECT_TRUE(contains(read_file(folder_ / "skin.ply"), "property uint region\nproperty uint region_high\n"));
+}
+
+TEST_F(SkinCommandTest, CoarsenLeavesFewerTrianglesWithinItsError) {
+  write("block.csv", numbered_block(0));
+  ASSERT_EQ(skin({"block.csv", "-o", "fine.ply"}).code, 0);
+  const Outcome outcome = skin({"block.csv", "-o", "coarse.ply", "--coarsen", "0.1", "--check", "--json"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const json j = json::parse(outcome.out).at("frames").at(0);
+  EXPECT_LE(j.at("coarsen_error").get<double>(), 0.1) << "a tenth of a spacing of 1";
+  const TriMesh fine = mesh("fine.ply"), coarse = mesh("coarse.ply");
+  EXPECT_LT(2 * coarse.triangles.size(), fine.triangles.size());
+  EXPECT_NEAR(geometry::signed_volume(coarse), geometry::signed_volume(fine), 0.02 * 400);
+}
+
+TEST_F(SkinCommandTest, DropsAreKeptOrLeftOutByChoice) {
+  write("two.csv", numbered_block(0) + "20,0,0,0.5,900\n");
+  for (const std::string kind : {"levelset", "voronoi"}) {
+    ASSERT_EQ(skin({"two.csv", "-o", "kept.ply", "--tessellation", kind}).code, 0);
+    EXPECT_EQ(geometry::validate(mesh("kept.ply")).components, 2u);
+    const Outcome outcome = skin({"two.csv", "-o", "left.ply", "--tessellation", kind, "--drop-volume", "10", "--json"});
+    ASSERT_EQ(outcome.code, 0);
+    EXPECT_EQ(geometry::validate(mesh("left.ply")).components, 1u);
+    EXPECT_EQ(json::parse(outcome.out).at("frames").at(0).at("dropped_pieces"), 1);
+  }
+}
+
+TEST_F(SkinCommandTest, TheTerrainEndsTheSkinInTheParticlesCoordinates) {
+  // On the map: a plane that rises to the east by a fifth, and a block of lava on it.
+  std::string grid = "ncols 12\nnrows 12\nxllcenter 2667000\nyllcenter 6479000\ncellsize 2\n";
+  for (int row = 0; row < 12; ++row) {
+    for (int column = 0; column < 12; ++column) grid += fmt::format("{} ", 100 + 0.4 * column);
+    grid += "\n";
+  }
+  write("ground.asc", grid);
+  std::string block;
+  const auto ground = [](double x) { return 100 + 0.2 * (x - 2667000); };
+  for (int n = 0; n < 10 * 10 * 3; ++n) {
+    const double x = 2667006 + n % 10, y = 6479006 + n / 10 % 10;
+    block += fmt::format("{:.3f} {:.3f} {:.3f}\n", x, y, ground(x) + 0.5 + n / 100);
+  }
+  write("block.xyz", block);
+  for (const std::string kind : {"levelset", "voronoi"}) {
+    const Outcome outcome = skin({"block.xyz", "-r", "0.5", "-o", "skin.obj", "--terrain", "ground.asc", "--tessellation", kind, "--check", "--json"});
+    ASSERT_EQ(outcome.code, 0) << outcome.out << outcome.err;
+    EXPECT_NEAR(json::parse(outcome.out).at("frames").at(0).at("volume").get<double>(), 300, 3) << "above the ground";
+    const TriMesh found = mesh("skin.obj");
+    Real lowest = 1, under = 0;
+    for (const Vec3& x : found.positions) {
+      const Real height = x.z() - ground(x.x());
+      lowest = std::min(lowest, height);
+      under += height < -0.1;
+    }
+    // A voxel and a half under it, along its normal; many vertices there, for it has a bottom.
+    EXPECT_NEAR(lowest, -0.75, 0.12);
+    EXPECT_GT(under, 0.2 * static_cast<Real>(found.positions.size()));
+  }
+  // Without it the lowest vertices are half a spacing under the particles.
+  ASSERT_EQ(skin({"block.xyz", "-r", "0.5", "-o", "free.obj"}).code, 0);
+  Real lowest = 1;
+  for (const Vec3& x : mesh("free.obj").positions) lowest = std::min(lowest, x.z() - ground(x.x()));
+  EXPECT_GT(lowest, -0.4);
+  // Beside the lava it changes nothing, which is said.
+  write("beside.xyz", "0 0 0\n1 0 0\n");
+  const Outcome beside = skin({"beside.xyz", "-r", "0.5", "-o", "skin.obj", "--terrain", "ground.asc"});
+  ASSERT_EQ(beside.code, 0) << beside.err;
+  EXPECT_TRUE(contains(beside.err, "no particle lies over ground.asc")) << beside.err;
 }
 
 TEST_F(SkinCommandTest, TheSameBytesOnOneAndTwoThreads) {

@@ -7,6 +7,7 @@
 #include "geometry/base/parallel.h"
 #include "geometry/base/random.h"
 #include "skin/color/srgb.h"
+#include "skin/preview/bloom.h"
 
 namespace effuse::skin {
 namespace {
@@ -61,6 +62,26 @@ TEST(LavaColor, EmissionStartsAtTheDraperPointAndRisesToItsReference) {
     before = now;
   }
   EXPECT_NEAR(lava_emission(options.reference, options).maxCoeff(), options.strength, 1e-12);
+}
+
+TEST(LavaColor, OnScreenItGoesFromDeepRedOverOrangeToYellowWithoutAStandstill) {
+  // What photographs of lava show; sRGB bytes.
+  const auto screen = [](double T) {
+    const Vec3 e = lava_emission(T);
+    float rgb[3] = {static_cast<float>(e.x()), static_cast<float>(e.y()), static_cast<float>(e.z())};
+    tone_map(rgb);
+    return Vec3(255 * srgb_from_linear(rgb[0]), 255 * srgb_from_linear(rgb[1]), 255 * srgb_from_linear(rgb[2]));
+  };
+  const Vec3 red = screen(1100), orange = screen(1300), yellow = screen(1450);
+  EXPECT_GT(red.x(), 150);
+  EXPECT_LT(red.y(), 50) << "deep red";
+  EXPECT_GT(orange.x(), 230);
+  EXPECT_GT(orange.y(), 95) << "orange";
+  EXPECT_LT(orange.y(), 150);
+  EXPECT_GT(yellow.y(), 180) << "yellow";
+  EXPECT_LT(yellow.y(), 225);
+  EXPECT_LT(yellow.z(), 90) << "not white";
+  for (double T = 1100; T < 1450; T += 50) EXPECT_GT(screen(T + 50).y() - screen(T).y(), 10) << T;
 }
 
 TEST(LavaColor, CracksAreHotterThanPlatesAndNothingIsHotterThanItsLava) {

@@ -16,6 +16,7 @@
 #include "geometry/mesh/validate.h"
 #include "skin/detail/displace.h"
 #include "skin/surface/level_set.h"
+#include "skin/tessellate/make_skin.h"
 #include "skin/tessellate/regions.h"
 #include "tests/skin/surface/shapes.h"
 
@@ -273,7 +274,7 @@ void expect_no_kinks(SkinKind kind, Real radius, int levels) {
   points.id = id;
   LevelSetOptions set;
   set.spacing = 1;
-  const TriMesh coarse = mesh_level_set(build_level_set(points, cloud.volume(), nullptr, set));
+  const TriMesh coarse = tessellate_level_set(build_level_set(points, cloud.volume(), nullptr, set));
   const Regions regions(points, 1);
   for (int level = 1; level <= levels; ++level) {
     TriMesh mesh = coarse;

@@ -405,7 +405,6 @@ TEST_P(SurfaceCached, IsTheSameSurfaceToTheBit) {
   options.voxel = GetParam().voxel;
   Cloud cloud = fill(Box3(Vec3(-14, -14, 0), Vec3(14, 14, 3)), 1, [](const Vec3&) { return true; }, 0.15);
   SurfaceCache cache;
-  std::size_t least = ~std::size_t{0};
   for (int frame = 0; frame < 8; ++frame) {
     if (frame == 1 || frame == 4)
       for (Vec3& x : cloud.x)
@@ -425,9 +424,12 @@ TEST_P(SurfaceCached, IsTheSameSurfaceToTheBit) {
     ASSERT_EQ(a.triangles, b.triangles);
     ASSERT_EQ(a.normals, b.normals);
     EXPECT_EQ(fresh.report().renewed, fresh.report().blocks);
-    if (frame > 0 && frame < 6) least = std::min(least, kept.report().renewed);
-    if (frame == 2 || frame == 7) EXPECT_EQ(kept.report().renewed, 0u) << "nothing has moved";
-    if (frame == 1) EXPECT_LT(kept.report().renewed, kept.report().blocks / (GetParam().voxel < 0.4 ? 2 : 1));
+    if (frame == 2 || frame == 7) {
+      EXPECT_EQ(kept.report().renewed, 0u) << "nothing has moved";
+    }
+    if (frame == 1) {
+      EXPECT_LT(kept.report().renewed, kept.report().blocks / (GetParam().voxel < 0.4 ? 2 : 1));
+    }
   }
 }
 INSTANTIATE_TEST_SUITE_P(All, SurfaceCached, testing::Values(CacheCase{"coarse", 0.5, false}, CacheCase{"coarse_on_ground", 0.5, true}, CacheCase{"fine", 0.25, false}, CacheCase{"fine_on_ground", 0.25, true}),

@@ -148,6 +148,31 @@ TEST(Coarsening, OfRandomClustersStaysClosed) {
   }
 }
 
+TEST(Coarsening, LeavesEachLabelAVertex) {
+  // A flat-sided box cut fine, in patches: without labels next to nothing is left of its sides.
+  TriMesh mesh = geometry::make_box(Vec3(0, 0, 0), Vec3(4, 2, 1));
+  for (int k = 0; k < 4; ++k) mesh = refine(mesh);
+  TriMesh bare = mesh;
+  std::vector<Index> label;
+  std::vector<std::uint8_t> seen(64, 0);
+  for (const Vec3& x : mesh.positions) {
+    label.push_back(static_cast<Index>(std::min(3.0, x.x()) + 4 * std::min(3.0, std::floor(2 * x.y())) + 16 * std::min(3.0, std::floor(4 * x.z()))));
+    seen[label.back()] = 1;
+  }
+  CoarsenOptions options;
+  options.error = 1e-6;
+  const CoarsenReport without = coarsen(bare, options), with = coarsen(mesh, options, label);
+  EXPECT_TRUE(geometry::validate(mesh).solid());
+  const auto labels_left = [&](const CoarsenReport& report) {
+    std::vector<std::uint8_t> left(64, 0);
+    for (const Index v : report.kept) left[label[v]] = 1;
+    return std::count(left.begin(), left.end(), 1);
+  };
+  EXPECT_EQ(labels_left(with), std::count(seen.begin(), seen.end(), 1));
+  EXPECT_LT(labels_left(without), labels_left(with)) << "the test would tell nothing";
+  EXPECT_GT(with.removed, without.removed / 2);
+}
+
 TEST(Coarsening, OfNothingIsNothing) {
   TriMesh mesh;
   EXPECT_EQ(coarsen_to(mesh, 1).removed, 0u);

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <vector>
+
+#include "samples/study/study.h"
+
+/// Parts of skin_cases(), each in its own file.
+namespace effuse::study {
+
+void add_surface_cases(std::vector<Case>& cases);      // solids of particles: volume, distances, seconds
+void add_relief_cases(std::vector<Case>& cases);       // no kinks, no direction
+void add_temperature_cases(std::vector<Case>& cases);  // height, roughness, glow
+void add_picture_cases(std::vector<Case>& cases);      // close-ups
+
+}  // namespace effuse::study

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string_view>
+
+#include "geometry/mesh/points.h"
+#include "geometry/mesh/tri_mesh.h"
+#include "geometry/terrain/terrain.h"
+#include "skin/detail/displace.h"
+#include "skin/surface/level_set.h"
+#include "skin/tessellate/labels.h"
+#include "skin/tessellate/shapes.h"
+#include "skin/tessellate/voronoi.h"
+
+/// The front door of the skin: particles in, a mesh with its regions out. What it goes through has doors of its own, for other orders of
+/// doing things: build_level_set, mesh_level_set, tessellate_voronoi, refine_on, displace, coarsen.
+namespace effuse::skin {
+
+enum class TessellationKind {
+  kLevelSet,  ///< watertight mesh of the level set, triangles of one size; may be coarsened where flat
+  kVoronoi,   ///< fans of triangles on the particles' Voronoi regions: triangles that live with their particle
+};
+inline constexpr std::array<std::string_view, 2> kTessellationNames = {"levelset", "voronoi"};
+
+struct SkinOptions {
+  LevelSetOptions level_set;  ///< its spacing is everybody's
+  TessellationKind tessellation = TessellationKind::kLevelSet;
+  /// [spacings] how far the mesh may be from the fine one so as to have fewer triangles where it is flat; 0: as it is. Of kLevelSet only
+  /// (checked). Comes last, when the surface is displaced: relief lower than this goes.
+  Real coarsen = 0;
+  std::optional<DisplaceOptions> detail;  ///< refined and displaced by this, its spacing left out; without it smooth, as tessellated
+  bool mesh = true;                       ///< false: the level set alone
+};
+
+struct SkinReport {
+  LevelSetReport level_set;
+  VoronoiReport voronoi;  ///< of kVoronoi, before it was refined
+  DisplaceReport displace;
+  bool refined_enough = true;  ///< RefineToReport::enough
+  std::size_t coarsened = 0;   ///< vertices taken out
+  Real coarsen_error = 0;      ///< [m] CoarsenReport::error
+  TriangleShapes shapes;       ///< of the mesh in the end
+};
+
+/// A frame's skin.
+struct Skin {
+  LevelSet surface;
+  geometry::TriMesh mesh;  ///< closed, oriented, manifold; empty for no particles
+  RegionLabels regions;
+  SkinReport report;
+};
+
+/// The mesh of kLevelSet: mesh_level_set()'s, the vertices of its thinnest triangles moved along it by up to a third of a voxel
+/// (widen_thin).
+///   last  as for mesh_level_set
+geometry::TriMesh tessellate_level_set(const LevelSet& surface, SurfaceCache* last = nullptr);
+
+/// Level set, tessellation, regions, detail, coarsening, as options ask.
+///
+/// The surface particles are those that are nearest to a vertex of the smooth surface: kLevelSet of the mesh refined, kVoronoi of the level
+/// set's own mesh. Each has one region, nobody else has any. kLevelSet: vertices know theirs, also after displacement (a
+/// region is where the smooth surface is nearest to its particle) and coarsening (which leaves every region a vertex). kVoronoi: triangles
+/// know theirs, regions end at edges, so that the mesh is closed between them; a vertex on a border is of the smallest id's.
+/// Refined, kVoronoi's vertices lie on the same smooth surface as kLevelSet's (refine_on.h); refined or not, they are lifted by what
+/// its facets cut off (lift_facets), so that both enclose the same volume.
+///   points   position, radius, and what else there is
+///   volume   of the particles [m^3]: what the surface is to enclose (LevelSetOptions::match_volume)
+///   terrain  where the skin ends, and relief fades; nullptr: none
+///   last     what the frame before left of its surface (build_level_set): the same skin, sooner
+/// Throws as build_level_set and Relief do. Same bits on any number of threads.
+Skin make_skin(const geometry::Points& points, Real volume, const geometry::Terrain* terrain, const SkinOptions& options,
+               SurfaceCache* last = nullptr);
+
+}  // namespace effuse::skin
