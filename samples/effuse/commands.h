@@ -52,6 +52,7 @@ struct SkinCommand {
   std::string tessellation = "levelset";         ///< or "voronoi"
   double coarsen = 0;                            ///< in particle spacings, 2 radii; 0: not
   std::filesystem::path terrain;                 ///< where the skin ends, in the particles' coordinates; empty: none
+  std::vector<double> origin;                    ///< three numbers that are subtracted from the particles' coordinates, or none
   bool sph_normals = true;                       ///< from the field's gradient; else of the triangles
   bool check = false;
   std::string up = "z";                          ///< of the particles: "y" or "z"

@@ -85,6 +85,7 @@ void add_skin_options(CLI::App* verb, effuse::SkinCommand& skin) {
       ->check(CLI::IsMember({"levelset", "voronoi"}));
   verb->add_option("--coarsen", skin.coarsen, "fewer triangles where the surface is flat to so many particle spacings (2 radii), 0.1 say; 0: none; goes with levelset [0]")->check(CLI::Range(0.0, 1.0));
   verb->add_option("--terrain", skin.terrain, "ground to end the skin at: a DEM grid (ESRI ASCII) or a mesh, z up, in the coordinates of the particles; what they enclose is counted above it");
+  verb->add_option("--origin", skin.origin, "x y z that the outputs count from: subtracted from all positions, for map coordinates and others that floats are too coarse for; --terrain and --particle-aabb stay in the particles' own")->expected(3);
   verb->add_option("--sph-normals", skin.sph_normals, "on: normals of the field's gradient, off: of the triangles; normals are always written [on]")->transform(CLI::CheckedTransformer(switches));
   verb->add_option_function<bool>(
           "--normals",

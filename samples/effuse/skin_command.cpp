@@ -265,9 +265,9 @@ skin::LevelSetOptions level_set_options(const SkinCommand& command, Real radius,
 
 // The ground.
 
-/// As imported, but in the file's coordinates instead of local ones.
-geometry::Terrain in_file_coordinates(const geometry::Terrain& terrain) {
-  const Vec3 origin = terrain.georeference().origin;
+/// As imported, but counted from `wanted`, in the file's coordinates, instead of its own origin.
+geometry::Terrain counted_from(const geometry::Terrain& terrain, const Vec3& wanted) {
+  const Vec3 origin = terrain.georeference().origin - wanted;
   if (const geometry::HeightField* field = terrain.height_field()) {
     std::vector<Real> posts = field->posts();
     for (Real& z : posts) z += origin.z();
@@ -377,11 +377,13 @@ class Skinner {
   Skinner(const SkinCommand& command, const CommonOptions& common) : command_(command), common_(common) {
     if (command.particle_aabb_min.size() == 3) box_ = Box3(Vec3(command.particle_aabb_min.data()), Vec3(command.particle_aabb_max.data()));
     if (box_ && box_->isEmpty()) throw InputError(Place{}, "--particle-aabb-min is not below --particle-aabb-max");
+    if (command.origin.size() == 3) origin_ = Vec3(command.origin.data());
+    if (!origin_.allFinite()) throw InputError(Place{}, "--origin is not finite");
     if (command.particle_radius > 0) radius_ = Radius{command.particle_radius, "--particle-radius"};
     if (!command.terrain.empty()) {
       const importers::TerrainImport import = importers::import_terrain(command.terrain);
       for (const std::string& note : import.notes) tell_once(command.terrain, note);
-      terrain_ = in_file_coordinates(import.terrain);
+      terrain_ = counted_from(import.terrain, origin_);
     }
   }
 
@@ -393,7 +395,9 @@ class Skinner {
     for (const std::string& note : cloud.notes) tell_once(file, note);
     const std::size_t read = cloud.size();
     if (box_) crop(cloud, *box_);
+    for (Vec3& x : cloud.position) x -= origin_;
     choose_radius(file, cloud);
+    refuse_coarse_floats(file, cloud, outputs);
 
     ordered_json j;
     if (number) j["frame"] = *number;
@@ -450,7 +454,7 @@ class Skinner {
       j["check"] = to_json(*check);
     }
 
-    const skin::Metadata about = {{"generator", fmt::format("effuse {}", EFFUSE_VERSION)}, {"particles", file.filename().string()}};
+    const skin::Metadata about = {{"generator", fmt::format("effuse {}", EFFUSE_VERSION)}, {"particles", file.filename().string()}, {"origin", fmt::format("{:.17g} {:.17g} {:.17g}", origin_.x(), origin_.y(), origin_.z())}};
     for (const fs::path& output : outputs) write(output, skin, about);
     for (const fs::path& output : outputs) j["outputs"].push_back(output.string());
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -505,6 +509,20 @@ class Skinner {
   }
 
   /// The level set ends at the ground, which has to be where the particles are.
+  /// Far from the origin floats are so coarse that a mesh tears.
+  void refuse_coarse_floats(const fs::path& file, const PointCloud& cloud, const std::vector<fs::path>& outputs) const {
+    if (cloud.size() == 0 || std::all_of(outputs.begin(), outputs.end(), [](const fs::path& f) { return format_of(f) == Format::kObj; })) return;
+    Box3 box;
+    for (const Vec3& x : cloud.position) box.extend(x);
+    const Real farthest = std::max(box.min().cwiseAbs().maxCoeff(), box.max().cwiseAbs().maxCoeff()), step = farthest * 0x1p-23;
+    constexpr Real kFinest = 64;  // parts of a radius
+    if (step * kFinest <= radius_->value) return;
+    const Vec3 middle = (origin_ + box.center()).array().round();
+    throw InputError(Place{file.string()}, fmt::format("positions up to {:.4g}: the floats of PLY, GLB and VDB count in steps of {:.2g} there, wanted {:.2g}, a sixty-fourth of a particle's radius. "
+                                                       "--origin {:.12g} {:.12g} {:.12g} has the outputs count from there",
+                                                       farthest, step, radius_->value / kFinest, middle.x(), middle.y(), middle.z()));
+  }
+
   void look_for_ground(const fs::path& file, const PointCloud& cloud) {
     for (const Vec3& x : cloud.position)
       if (terrain_->height(x.x(), x.y())) return;
@@ -528,6 +546,7 @@ class Skinner {
   const SkinCommand& command_;
   const CommonOptions& common_;
   std::optional<Box3> box_;
+  Vec3 origin_ = Vec3::Zero();
   std::optional<Radius> radius_;
   std::optional<geometry::Terrain> terrain_;
   skin::SurfaceCache last_;  // of the frame before

@@ -31,9 +31,10 @@ struct Padded {
     const std::array<Index, 27>& around = blocks.around(b);
     for (int i = -1; i < kWide - 1; ++i)
       for (int j = -1; j < kWide - 1; ++j) {
-        const auto part = [&](int dz) {
+        const auto part = [&](int dz) -> const float* {
           const Index block = around[static_cast<std::size_t>(((i >> 3) + 1) * 9 + ((j >> 3) + 1) * 3 + dz)];
-          return block == kNone ? nullptr : &phi[block * kVoxels + voxel_index(i & 7, j & 7, 0)];
+          if (block == kNone) return nullptr;
+          return phi.data() + block * kVoxels + voxel_index(i & 7, j & 7, 0);
         };
         float* row = &value[at(i, j, -1)];
         std::fill_n(row, kWide, outside);
@@ -50,9 +51,10 @@ struct Padded {
   /// Of the cell at (i, j, k), -1 .. 8.
   unsigned configuration(int i, int j, int k) const {
     const float* c = &value[at(i, j, k)];
-    const float corner[8] = {c[0], c[1], c[kY], c[kY + 1], c[kX], c[kX + 1], c[kX + kY], c[kX + kY + 1]};
-    unsigned bits = 0;
-    for (unsigned n = 0; n < 8; ++n) bits |= (corner[n] < 0 ? 1u : 0u) << n;
+    // In a loop over the corners g++ 12 with -fsanitize=undefined gets them wrong.
+    const auto inside = [](float v) { return v < 0 ? 1u : 0u; };
+    const unsigned bits = inside(c[0]) | inside(c[1]) << 1 | inside(c[kY]) << 2 | inside(c[kY + 1]) << 3 | inside(c[kX]) << 4 | inside(c[kX + 1]) << 5 |
+                          inside(c[kX + kY]) << 6 | inside(c[kX + kY + 1]) << 7;
     return bits;
   }
 };
