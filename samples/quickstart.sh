@@ -32,3 +32,4 @@ echo
 echo "frames:    $PWD/$out/frames ($(find "$out/frames" -type f | wc -l) files, $(du -sh "$out/frames" | cut -f 1))"
 echo "pictures:  $PWD/$out/preview ($(find "$out/preview" -name 'preview.*.png' | wc -l) of them)"
 echo "at once:   $PWD/$out/preview/contact_sheet.png"
+echo "program:   $PWD/$effuse"
