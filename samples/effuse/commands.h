@@ -47,7 +47,8 @@ struct SkinCommand {
   double cube_size = 1;                          ///< of a voxel, in radii
   std::optional<double> surface_threshold;       ///< of the density in units of the rest density; absent: volume or 0.5
   std::optional<bool> match_volume;              ///< enclose the particles' volume; absent: if a radius is known and no threshold given
-  int mesh_smoothing_iters = 2;                  ///< passes of mean-curvature flow on the level set
+  std::string kernel = "round";                  ///< or "anisotropic"
+  std::optional<int> mesh_smoothing_iters;       ///< passes of mean-curvature flow on the level set; absent: 2, or 0 with anisotropic kernels
   double drop_volume = 0;                        ///< pieces and bubbles of fewer particles are left out
   std::string tessellation = "levelset";         ///< or "voronoi"
   double coarsen = 0;                            ///< in particle spacings, 2 radii; 0: not

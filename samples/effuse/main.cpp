@@ -77,8 +77,10 @@ void add_skin_options(CLI::App* verb, effuse::SkinCommand& skin) {
                    "level set, no isosurface of the density: drops and edges differ. Absent: the surface encloses the particles' volume, (2 radius)^3 each, if the radius is known, else 0.5")
       ->check(CLI::Range(0.1, 0.9));
   verb->add_option("--match-volume", skin.match_volume, "on or off: see --surface-threshold")->transform(CLI::CheckedTransformer(switches));
+  verb->add_option("--kernel", skin.kernel, "round: particles are averaged with spheres; anisotropic: with ellipsoids that follow the surface: flatter faces, sharper edges, drops keep their volume, half as slow again; not with --surface-threshold [round]")
+      ->check(CLI::IsMember({"round", "anisotropic"}));
   verb->add_option("--mesh-smoothing-iters", skin.mesh_smoothing_iters,
-                   "passes of mean-curvature flow on the level set before it is meshed, each of radius^2 / 6 (about three of splashsurf's on its mesh at cube size 0.5); drops keep their size [2]")
+                   "passes of mean-curvature flow on the level set before it is meshed, each of radius^2 / 6 (about three of splashsurf's on its mesh at cube size 0.5); drops keep their size [2; 0 with --kernel anisotropic]")
       ->check(CLI::Range(0, 100));
   verb->add_option("--drop-volume", skin.drop_volume, "leave out closed pieces, and fill bubbles, of less than this many particles' volume [0]")->check(CLI::Range(0.0, 1e9));
   verb->add_option("--tessellation", skin.tessellation, "levelset: triangles of one size; voronoi: fans of triangles, a spacing wide, on each particle's part of the surface. PLY carries the particle's id as region: of vertices, and with voronoi of faces [levelset]")

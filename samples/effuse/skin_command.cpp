@@ -247,11 +247,16 @@ skin::LevelSetOptions level_set_options(const SkinCommand& command, Real radius,
   options.spacing = 2 * radius;
   options.voxel = command.cube_size * radius;
   options.influence = command.smoothing_length;
-  options.smoothing = command.mesh_smoothing_iters;
+  if (command.kernel == "anisotropic") options.kernel = skin::SurfaceKernel::kAnisotropic;
+  options.smoothing = command.mesh_smoothing_iters.value_or(options.kernel == skin::SurfaceKernel::kAnisotropic ? 0 : options.smoothing);
   options.drop_volume = command.drop_volume;
   options.match_volume = match_volume;
   if (match_volume) {
     options.radius = std::min(options.radius, options.influence - 1.05);
+    return options;
+  }
+  if (options.kernel == skin::SurfaceKernel::kAnisotropic) {
+    if (command.surface_threshold) throw InputError(Place{}, "--surface-threshold goes with --kernel round: anisotropic kernels have no density to cut at");
     return options;
   }
   const Real threshold = command.surface_threshold.value_or(0.5);

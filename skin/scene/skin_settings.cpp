@@ -16,6 +16,9 @@ SkinSettings read_skin_settings(flow::Parameters& root) {
   LevelSetOptions& level_set = s.level_set;
   level_set.influence = skin.number("influence", "", level_set.influence, {1, 4}, "a particle is felt within this many spacings");
   level_set.radius = skin.number("radius", "", level_set.radius, {0.3, 1}, "of the sphere round a lone particle, in spacings");
+  level_set.kernel = static_cast<SurfaceKernel>(skin.choice("kernel", {kSurfaceKernelNames.begin(), kSurfaceKernelNames.end()}, static_cast<std::size_t>(level_set.kernel),
+                                                            "particles are averaged with spheres, or with ellipsoids that follow the surface: flatter, sharper fronts, slower"));
+  if (level_set.kernel == SurfaceKernel::kAnisotropic) level_set.smoothing = 0;
   level_set.smoothing = static_cast<int>(skin.integer("smoothing", level_set.smoothing, 0, 20, "passes of mean-curvature flow"));
   level_set.drop_volume = skin.number("drop_volume", "", level_set.drop_volume, Parameters::not_negative(), "pieces of fewer particles are left out");
   level_set.match_volume = skin.flag("match_volume", level_set.match_volume, "enclose the particles' volume");

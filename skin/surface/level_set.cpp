@@ -6,6 +6,7 @@
 #include "geometry/base/check.h"
 #include "geometry/base/parallel.h"
 #include "geometry/base/zones.h"
+#include "skin/surface/anisotropy.h"
 #include "skin/surface/level_set_impl.h"
 #include "skin/surface/rasterize.h"
 #include "skin/surface/surface_cache.h"
@@ -29,6 +30,7 @@ namespace {
 
 /// What the field is made with; lengths in voxels.
 struct Making {
+  SurfaceKernel kernel = SurfaceKernel::kRound;
   RasterOptions raster;
   float smoothing = 0;       // time of the flow
   float lone = 0, sheet = 0;  // W at the surface of a lone particle, of a plane sheet
@@ -40,7 +42,10 @@ struct Making {
 /// The field before its shift, on some of the blocks; ground: out.
 Field make_field(const LevelSet::Impl& s, const Blocks& blocks, const Making& making, GroundField& ground) {
   Field phi, weight;
-  rasterize(s.particles, blocks, making.raster, phi, weight);
+  if (making.kernel == SurfaceKernel::kAnisotropic)
+    rasterize_anisotropic(s.particles, anisotropic_kernels(s.particles, making.raster.spacing, making.raster.reach, &blocks), blocks, making.raster, phi, weight);
+  else
+    rasterize(s.particles, blocks, making.raster, phi, weight);
   smooth(blocks, s.outside, making.smoothing, weight, making.lone, making.sheet, phi);
   if (!making.terrain) return phi;
   ground = sample_ground(blocks, s.particles.origin(), s.voxel, *making.terrain, std::max(2 * s.lift, making.depth()) + 1);
@@ -51,12 +56,15 @@ Field make_field(const LevelSet::Impl& s, const Blocks& blocks, const Making& ma
 
 /// The same on all blocks, from the last frame where nothing has changed. stale: out, the blocks that were made anew.
 Field renew_field(const LevelSet::Impl& s, const Making& making, SurfaceCache::Impl& last, const std::vector<std::uint64_t>& hash, GroundField& ground, Renewal& renewal) {
-  // How far a value feels a particle, and what it needs of the values around it: sums between nodes, a voxel a step, the lift.
+  // How far a value feels a particle, what it needs of the values around it (a voxel a step, the lift), and whether it depends on
+  // what the blocks beside its own hold (sums at nodes; being deep inside).
   const int steps = smoothing_steps(making.smoothing);
-  const float nodes = making.raster.reach >= kFineReach ? 4 : 0, lift = making.terrain ? 2 * s.lift + 2 : 0;
-  const float beyond = static_cast<float>(steps) + lift;
-  renewal = find_stale(last, s.particles, hash, s.blocks, static_cast<Real>(s.reach + nodes + beyond));
-  const std::vector<std::uint8_t> needed = widened(s.blocks, renewal.stale, static_cast<int>(std::ceil(beyond / kSide)) + (nodes > 0 ? 1 : 0));
+  const float lift = making.terrain ? 2 * s.lift + 2 : 0, beyond = static_cast<float>(steps) + lift;
+  const bool round = making.kernel == SurfaceKernel::kRound, blocks_beside = !round || making.raster.reach >= kFineReach;
+  const Real felt = round ? static_cast<Real>(s.reach) + (blocks_beside ? 4 : 0)
+                          : std::max<Real>(kernel_influence(making.raster.spacing, s.reach), kSide + static_cast<Real>(making.raster.spacing));
+  renewal = find_stale(last, s.particles, hash, s.blocks, felt + static_cast<Real>(beyond));
+  const std::vector<std::uint8_t> needed = widened(s.blocks, renewal.stale, static_cast<int>(std::ceil(beyond / kSide)) + (blocks_beside ? 1 : 0));
   std::vector<BlockCoord> coords;
   for (std::size_t b = 0; b < s.blocks.size(); ++b)
     if (needed[b]) coords.push_back(s.blocks.coords()[b]);
@@ -89,7 +97,7 @@ Field renew_field(const LevelSet::Impl& s, const Making& making, SurfaceCache::I
 /// Whether values of the last frame can be used at all.
 bool fits(const SurfaceCache::Impl& last, const LevelSetOptions& o, const geometry::Terrain* terrain, const Vec3& origin) {
   const LevelSetOptions& p = last.options;
-  return last.filled && last.terrain == terrain && last.origin == origin && p.spacing == o.spacing && p.voxel == o.voxel && p.influence == o.influence &&
+  return last.filled && last.terrain == terrain && last.origin == origin && p.spacing == o.spacing && p.voxel == o.voxel && p.influence == o.influence && p.kernel == o.kernel &&
          p.radius == o.radius && p.smoothing == o.smoothing && p.sink == o.sink;
 }
 
@@ -125,7 +133,8 @@ LevelSet build_level_set(const geometry::Points& points, Real volume, const geom
   s.blocks = blocks_around(s.particles, s.reach + (terrain ? sink + 1 : 0));
   if (terrain) s.terrain = *terrain;
   const float near_surface = 1 - (radius / s.reach) * (radius / s.reach);
-  Making making{.raster = {.reach = s.reach, .spacing = d, .radius_factor = 2 * static_cast<float>(options.radius), .outside = s.outside},
+  Making making{.kernel = options.kernel,
+                .raster = {.reach = s.reach, .spacing = d, .radius_factor = 2 * static_cast<float>(options.radius), .outside = s.outside},
                 .smoothing = static_cast<float>(options.smoothing) * d * d / 24,
                 .lone = near_surface * near_surface * near_surface,
                 .sink = sink,

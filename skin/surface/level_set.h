@@ -1,8 +1,10 @@
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -12,10 +14,16 @@
 
 namespace effuse::skin {
 
+/// What the particles are averaged with: spheres (Zhu & Bridson 2005), or ellipsoids that follow the lava's surface (Yu & Turk 2013;
+/// anisotropy.h): flatter faces, sharper edges and fronts, drops that keep their volume, for about half as much time again; asks for no smoothing.
+enum class SurfaceKernel { kRound, kAnisotropic };
+inline constexpr std::array<std::string_view, 2> kSurfaceKernelNames = {"round", "anisotropic"};
+
 struct LevelSetOptions {
   Real spacing = 0;          ///< particle spacing [m], > 0
   Real voxel = 0;            ///< [m]; 0: spacing / 2
   Real influence = 2;        ///< a particle is felt within influence * spacing
+  SurfaceKernel kernel = SurfaceKernel::kRound;  ///< kAnisotropic: with smoothing 0, or edges are lost again
   Real radius = 0.6;         ///< of the sphere round a lone particle, in spacings (about (3/4pi)^(1/3) = 0.62 for equal volume)
   int smoothing = 2;         ///< passes of mean-curvature flow, each as far as one at voxel = spacing / 2 whatever the voxel
   Real sink = 0;             ///< [m] how far under the ground the surface ends; 0: one and a half voxels

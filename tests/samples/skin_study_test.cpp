@@ -36,12 +36,15 @@ namespace fs = std::filesystem;
 bool is_long(const Case& c) { return c.name.starts_with("work-") || c.name == "close-ups"; }
 
 /// Figures that miss their bar, and the error they have now. The page calls them missed; here they may get better, and not worse by more
-/// than a quarter. Sharp edges and corners: averages over particles two spacings about round them.
+/// than a quarter. Sharp edges and corners: averages over particles two spacings about round them; where disorder leaves a corner
+/// empty no kernel fills it. Anisotropic kernels show the steps of a lattice on a torus.
 struct Shortfall {
-  std::string_view name, what;
-  double error;
+  std::string_view name, method;
+  double error;  // Hausdorff distance [spacings]
 };
-constexpr Shortfall kShort[] = {{"slab", "Hausdorff distance", 0.834}, {"cylinder", "Hausdorff distance", 0.624}};
+constexpr Shortfall kShort[] = {{"slab", "level set", 0.834},  {"cylinder", "level set", 0.624},   {"slab", "anisotropic", 0.805},
+                                {"torus", "anisotropic", 0.582}, {"cylinder", "anisotropic", 0.524}, {"round-slab", "anisotropic", 0.562},
+                                {"sphere", "anisotropic", 0.522}};
 
 std::vector<Case> cases_to_hold() {
   std::vector<Case> cases = skin_cases();
@@ -57,7 +60,7 @@ TEST_P(SkinStudySlow, HoldsItsBars) {
   EXPECT_FALSE(outcome.result.measures.empty());
   EXPECT_FALSE(outcome.result.plots.empty());
   for (const Measure& m : outcome.result.measures) {
-    const auto known = std::find_if(std::begin(kShort), std::end(kShort), [&](const Shortfall& s) { return s.name == outcome.name && m.what.ends_with(s.what); });
+    const auto known = std::find_if(std::begin(kShort), std::end(kShort), [&](const Shortfall& s) { return s.name == outcome.name && m.what.starts_with(s.method) && m.what.ends_with("Hausdorff distance"); });
     EXPECT_LE(m.error, known != std::end(kShort) ? std::max(m.hold, 1.25 * known->error) : m.hold) << m.what << "\n" << table_text({outcome}) << outcome.result.note;
   }
 }

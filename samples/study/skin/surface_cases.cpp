@@ -31,9 +31,12 @@ struct Method {
   int smoothing = 2;
   bool voronoi = false;
   Real refined = 0;  // [spacings] edge, 0: not
+  skin::SurfaceKernel kernel = skin::SurfaceKernel::kRound;
 };
-constexpr Method kDefault = {"level set", 2, false, 0};
+constexpr Method kDefault = {"level set", 2, false, 0}, kAnisotropic = {"anisotropic", 0, false, 0, skin::SurfaceKernel::kAnisotropic};
+constexpr Method kCompared[] = {kDefault, kAnisotropic};
 constexpr Method kMethods[] = {kDefault,
+                               kAnisotropic,
                                {"level set, not smoothed", 0, false, 0},
                                {"level set, smoothing 6", 6, false, 0},
                                {"level set, refined to 1/4", 2, false, 0.25},
@@ -67,6 +70,7 @@ TriMesh mesh_of(const geometry::Points& points, Real volume, const Method& metho
   options.spacing = 1;
   options.voxel = 1.0 / voxels;
   options.smoothing = method.smoothing;
+  options.kernel = method.kernel;
   TriMesh mesh = skin::mesh_level_set(skin::build_level_set(points, volume, nullptr, options));
   if (method.voronoi) mesh = skin::tessellate_voronoi(mesh, skin::Regions(points, 1), points).mesh;
   if (method.refined > 0) {
@@ -179,8 +183,8 @@ CaseResult surfaces(const Solid& solid, const std::string& file, std::span<const
 void add_surface_cases(std::vector<Case>& cases) {
   for (const Solid& solid : solids()) {
     const std::string name = dashed(solid.name);
-    cases.push_back({name, fmt::format("Level set of a {} filled with particles, three voxel sizes", solid.name), "the solid itself", true,
-                     [&solid, name] { return surfaces(solid, "skin_" + name, kFillings, {&kDefault, 1}); }});
+    cases.push_back({name, fmt::format("Level set of a {} filled with particles, three voxel sizes, round and anisotropic kernels", solid.name), "the solid itself", true,
+                     [&solid, name] { return surfaces(solid, "skin_" + name, kFillings, kCompared); }});
   }
   for (const Solid& solid : solids()) {
     const std::string name = dashed(solid.name);
