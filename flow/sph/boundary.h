@@ -127,6 +127,18 @@ class BoundaryTable {
     const auto mix = [t](Real x, Real y) { return x + t * (y - x); };
     return {mix(a.gamma, b.gamma), mix(a.slope, b.slope), mix(a.bend, b.bend), mix(a.drag_t, b.drag_t), mix(a.drag_n, b.drag_n), mix(a.moment_n, b.moment_n), mix(a.moment_t, b.moment_t)};
   }
+  /// The distance at which gamma is `value`, within +- support: the end beyond which there is none.
+  Real distance_of_gamma(Real value) const {
+    std::size_t low = 0, high = 2 * kNodes;
+    if (value >= row_[low].gamma) return -support_;
+    if (value <= 0) return support_;
+    while (high - low > 1) {
+      const std::size_t mid = (low + high) / 2;
+      (row_[mid].gamma >= value ? low : high) = mid;
+    }
+    const Real a = row_[low].gamma, b = row_[high].gamma;
+    return support_ / kNodes * (static_cast<Real>(low) - kNodes + (a > b ? (a - value) / (a - b) : 0));
+  }
   /// The distance in [0, support] at which -slope is `value`: how far off a plane free surface is when the gradient of
   /// the kernel's sum is that large. 0 for values above -slope(0); the support for 0 (the last layer is out of sight from
   /// half a spacing nearer on).

@@ -105,7 +105,7 @@ void find_shape(const ParticleSystem& s, Real lattice, const FilmFriction& film,
   }
   parallel_for(n, [&](std::size_t i) {
     const Real friction = film.at(depth[i] == kUnseen ? kUnseen * dx : depth[i]);
-    for (Index w = walls.first[i]; w < walls.first[i + 1]; ++w) walls.walls[w].friction = friction;
+    for (Index w = walls.first[i]; w < walls.first[i + 1]; ++w) walls.walls[w].friction *= friction;
   });
 }
 
@@ -132,6 +132,32 @@ void bend_walls(const ParticleSystem& s, Walls& walls, std::vector<Real>& distan
       if (row.slope < 0) walls.walls[w].distance = wall.reach + std::clamp(-curvature * row.bend / row.slope, -most, most);
     }
   });
+}
+
+void trim_walls(const BoundaryTable& boundary, Walls& walls) {
+  const Real whole = boundary.at(-boundary.support()).gamma;
+  parallel_for(walls.first.size() - 1, [&](std::size_t i) {
+    const std::span<Wall> own(walls.walls.data() + walls.first[i], walls.first[i + 1] - walls.first[i]);
+    if (own.size() < 2) return;
+    // By distance; of equal ones in the order of the list.
+    std::array<Index, 16> order;
+    const std::size_t n = std::min(own.size(), order.size());
+    for (std::size_t k = 0; k < n; ++k) {
+      std::size_t at = k;
+      for (; at > 0 && own[order[at - 1]].distance > own[k].distance; --at) order[at] = order[at - 1];
+      order[at] = static_cast<Index>(k);
+    }
+    std::array<Real, 16> share;
+    for (std::size_t k = 0; k < n; ++k) share[k] = boundary.at(own[order[k]].distance).gamma / whole;
+    for (std::size_t b = 1; b < n; ++b) {
+      Real left = share[b];
+      for (std::size_t a = 0; a < b; ++a) {
+        const Real c = 2 / kPi * std::asin(std::clamp(own[order[a]].normal.dot(own[order[b]].normal), -1.0, 1.0)), product = share[a] * share[b];
+        left -= c >= 0 ? (1 - c) * product + c * std::min(share[a], share[b]) : (1 + c) * product;
+      }
+      own[order[b]].distance = std::max(own[order[b]].distance, boundary.distance_of_gamma(std::max(left, 0.0) * whole));
+    }
+  }, 2048);
 }
 
 void shear_rate_squared(const ParticleSystem& s, Real slip_length, std::span<const Vec3> v, std::span<Real> out) {

@@ -31,7 +31,7 @@ struct FlowShape {
 /// L = V sum W over a cubic lattice.
 Real lattice_sum(KernelKind kernel, Real support, Real spacing);
 
-/// Fills shape, and the friction of walls under thin lava: by `film` at the depth of the film, known where the free surface
+/// Fills shape, and multiplies the friction of walls under thin lava: by `film` at the depth of the film, known where the free surface
 /// is near, or told by neighbours there.
 void find_shape(const ParticleSystem& system, Real lattice, const FilmFriction& film, Walls& walls, FlowShape& shape);
 
@@ -39,6 +39,16 @@ void find_shape(const ParticleSystem& system, Real lattice, const FilmFriction& 
 /// curvatures c from how the normals of neighbours' walls turn, distance += c bend / |slope|, by half a spacing
 /// at most. The walls' own distances are kept in `distances` (one a wall).
 void bend_walls(const ParticleSystem& system, Walls& walls, std::vector<Real>& distances);
+
+/// Where two walls' half-spaces overlap, in a corner or where an obstacle stands in the ground, what lies behind both is counted once:
+/// the farther wall is moved away until its gamma lacks what it shares with the nearer one,
+///
+///   gamma_ab = (1 - c) gamma_a gamma_b + c min(gamma_a, gamma_b)  for c = 1 - 2 angle(n_a, n_b) / pi >= 0,   (1 + c) gamma_a gamma_b  below
+///
+/// gammas as shares of the whole: exact on the edge itself, for walls of one plane (c = 1) or face to face (c = -1), and at right angles
+/// for kernels that are products of their coordinates; within 0.04 of the whole for ours. Of three walls each shares with every
+/// nearer one. For bend_walls()'s walls; changes `distance` alone.
+void trim_walls(const BoundaryTable& boundary, Walls& walls);
 
 /// Shear rate squared, 2 D:D [1/s^2], D the symmetric part of the velocity's gradient
 ///

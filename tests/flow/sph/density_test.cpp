@@ -72,6 +72,59 @@ TEST_P(FilmShape, GivesItsWallsTheFrictionOfItsDepth) {
 
 INSTANTIATE_TEST_SUITE_P(Films, FilmShape, testing::Combine(testing::Values(1, 2, 3, 4, 7), testing::Values(3.0, 2.6)));
 
+/// Integral of the kernel over what lies behind a plane at d1 or behind another at d2, normals `angle` apart; midpoint rule.
+Real behind_either(const WendlandC2& W, Real d1, Real d2, Real angle) {
+  constexpr int kCells = 48;
+  const Real h = W.support / kCells;
+  const Vec3 n1 = Vec3::UnitZ(), n2(std::sin(angle), 0, std::cos(angle));
+  Real sum = 0;
+  for (int i = -kCells; i < kCells; ++i)
+    for (int j = 0; j < kCells; ++j)  // the other half is the same
+      for (int k = -kCells; k < kCells; ++k) {
+        const Vec3 p = h * Vec3(i + 0.5, j + 0.5, k + 0.5);
+        if (p.squaredNorm() < W.support * W.support && (p.dot(n1) < -d1 || p.dot(n2) < -d2)) sum += 2 * h * h * h * W.W(p.norm());
+      }
+  return sum;
+}
+
+TEST(TrimWalls, CountWhatLiesBehindTwoWallsOnce) {
+  const WendlandC2 W(3);
+  const BoundaryTable table(W, 0.15);  // so fine that its layers are an integral
+  Real worst_without = 0;
+  for (const Real angle : {30.0, 60.0, 90.0, 120.0, 150.0})
+    for (const auto& [d1, d2] : {std::pair{0.25, 0.25}, {0.5, 0.5}, {0.25, 1.0}, {0.5, 1.5}, {1.0, 1.0}}) {
+      Walls walls{{0, 2}, {{}, {}}};
+      const Real a = angle * kPi / 180;
+      walls.walls[0].normal = Vec3(std::sin(a), 0, std::cos(a));
+      walls.walls[0].distance = walls.walls[0].reach = d2;
+      walls.walls[1].distance = walls.walls[1].reach = d1;
+      const Real exact = behind_either(W, d1, d2, a), before = table.at(d1).gamma + table.at(d2).gamma;
+      trim_walls(table, walls);
+      EXPECT_NEAR(table.at(walls.walls[0].distance).gamma + table.at(walls.walls[1].distance).gamma, exact, 0.04) << angle << " deg, " << d1 << " and " << d2;
+      EXPECT_EQ(std::min(walls.walls[0].distance, walls.walls[1].distance), std::min(d1, d2)) << "the nearer one stays";
+      worst_without = std::max(worst_without, std::abs(before - exact));
+    }
+  EXPECT_GT(worst_without, 0.15) << "the test tells nothing";
+}
+
+TEST(TrimWalls, OfOnePlaneCountOnceAndOfTwoFacesTwice) {
+  const Real dx = 0.5;
+  SampleSystem s(lattice_block(8, 8, 3, dx), dx, 3);
+  s.period = Vec2(8 * dx, 8 * dx);
+  s.solids = {plane_solid(Vec3::Zero(), Vec3::UnitZ())};
+  s.find();
+  const std::vector<Real> once = shape_of(s).density;
+  s.solids.push_back(s.solids.front());
+  s.find();
+  trim_walls(s.table, s.walls);
+  const std::vector<Real> doubled = shape_of(s).density;
+  for (std::size_t i = 0; i < s.size(); ++i) EXPECT_NEAR(doubled[i], once[i], 1e-4);
+  s.solids.back() = plane_solid(Vec3(0, 0, 3 * dx), -Vec3::UnitZ());
+  s.find();
+  trim_walls(s.table, s.walls);
+  for (const Real d : shape_of(s).density) EXPECT_NEAR(d, 1, 2e-3) << "a gap, full";
+}
+
 TEST(FlowShape, DisorderedFilmsKeepTheirDensityAndTheirAreas) {
   // 10 % jitter: each density within 8 %, their mean within 1 %, areas within 5 %.
   for (const int layers : {2, 4, 8}) {
