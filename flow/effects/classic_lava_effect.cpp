@@ -145,10 +145,11 @@ LavaModel read_classic_lava(Parameters& p) {
   model.spacing = o.spacing;
   model.sets_the_step = "max_step, courant, stiffness, viscosity and heat exchange";
   model.estimate = [o](const std::vector<PlannedVent>& vents, Real duration) { return estimate(o, vents, duration); };
-  model.make = [o](const std::vector<Vent>& vents, const geometry::Terrain& terrain, std::uint64_t seed) -> std::unique_ptr<Effect> {
+  model.obstacles = false;
+  model.make = [o](const std::vector<Vent>& vents, const World& world) -> std::unique_ptr<Effect> {
     ClassicOptions options = o;
-    options.seed = seed;
-    return std::make_unique<ClassicLavaEffect>(options, vents, terrain);
+    options.seed = world.seed;
+    return std::make_unique<ClassicLavaEffect>(options, vents, *world.terrain);
   };
   return model;
 }

@@ -66,13 +66,16 @@ EffectPlan read_lava(Parameters& p, Real duration) {
                               plan.estimate.steps, kMostSteps, model.sets_the_step));
     }
   }
-  plan.misfits = [vents](const World& world) {
+  plan.misfits = [vents, obstacles = model.obstacles, place = p.place("model")](const World& world) {
     std::vector<Fault> faults;
+    if (!obstacles && world.obstacles && !world.obstacles->empty())
+      faults.push_back({place, "the classic model knows the terrain only: [[obstacle]] goes with model = \"modern\""});
     place_vents(vents, *world.terrain, faults);
     return faults;
   };
-  plan.build = [make = model.make, spacing = model.spacing, vents](const World& world) {
-    return make(place_whole_vents(vents, *world.terrain, spacing), *world.terrain, world.seed);
+  plan.build = [make = model.make, spacing = model.spacing, misfits = plan.misfits, vents](const World& world) {
+    if (const std::vector<Fault> faults = misfits(world); !faults.empty()) throw InputError(faults);
+    return make(place_whole_vents(vents, *world.terrain, spacing), world);
   };
   return plan;
 }

@@ -16,7 +16,8 @@ struct LavaModel {
   Real vent_temperature = 1473.15;  ///< [K] of vents that do not say
   std::string sets_the_step;        ///< parameters that make steps short: for a fault
   std::function<Estimate(const std::vector<PlannedVent>& vents, Real duration)> estimate;
-  std::function<std::unique_ptr<Effect>(const std::vector<sph::Vent>& vents, const geometry::Terrain& terrain, std::uint64_t seed)> make;
+  bool obstacles = true;            ///< whether it flows around any
+  std::function<std::unique_ptr<Effect>(const std::vector<sph::Vent>& vents, const World& world)> make;
 };
 
 }  // namespace effuse::flow

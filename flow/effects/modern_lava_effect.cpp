@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "flow/effects/lava_rheology.h"
+#include "flow/effects/moving_obstacles.h"
 #include "flow/sph/lava_presets.h"
 #include "flow/sph/modern_lava.h"
 #include "geometry/base/parallel.h"
@@ -31,10 +32,11 @@ std::vector<std::string> names(const std::string_view (&list)[N]) {
 
 class ModernLavaEffect final : public Effect {
  public:
-  ModernLavaEffect(const ModernOptions& options, const std::vector<Vent>& vents, const geometry::Terrain& terrain)
-      : lava_(options, vents,
+  ModernLavaEffect(const ModernOptions& options, const std::vector<Vent>& vents, const geometry::Terrain& terrain, const std::vector<PlacedObstacle>& obstacles)
+      : obstacles_(std::make_unique<MovingObstacles>(obstacles)),
+        lava_(options, vents,
               {[terrain](std::span<const Vec3> x, Real reach, std::span<geometry::Contact> out) { terrain.contacts(x, reach, out); }},
-              [terrain](const Vec3& p) { return terrain.height(p.x(), p.y()).has_value(); }),
+              [terrain](const Vec3& p) { return terrain.height(p.x(), p.y()).has_value(); }, obstacles_->solids()),
         heat_(options.heat.on) {
     for (const Vent& vent : vents) {
       if (vent.rate <= 0) continue;
@@ -193,6 +195,7 @@ class ModernLavaEffect final : public Effect {
     io.value("max_speed", self.last_.max_speed);
   }
 
+  std::unique_ptr<MovingObstacles> obstacles_;  // lava_ refers to it
   ModernLava lava_;
   bool heat_;
   std::vector<Opening> openings_;
@@ -347,10 +350,10 @@ LavaModel read_modern_lava(Parameters& p) {
   if (preset) model.vent_temperature = preset->eruption_temperature;
   model.sets_the_step = "max_step, courant, spacing and the vents' rates";
   model.estimate = [o](const std::vector<PlannedVent>& vents, Real duration) { return estimate(o, vents, duration); };
-  model.make = [o](const std::vector<Vent>& vents, const geometry::Terrain& terrain, std::uint64_t seed) -> std::unique_ptr<Effect> {
+  model.make = [o](const std::vector<Vent>& vents, const World& world) -> std::unique_ptr<Effect> {
     ModernOptions options = o;
-    options.seed = seed;
-    return std::make_unique<ModernLavaEffect>(options, vents, terrain);
+    options.seed = world.seed;
+    return std::make_unique<ModernLavaEffect>(options, vents, *world.terrain, world.obstacles ? *world.obstacles : std::vector<PlacedObstacle>{});
   };
   return model;
 }

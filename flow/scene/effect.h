@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "flow/scene/obstacles.h"
 #include "flow/scene/parameters.h"
 #include "geometry/base/hash.h"
 #include "geometry/base/state_io.h"
@@ -19,6 +20,7 @@ namespace effuse::flow {
 struct World {
   const geometry::Terrain* terrain = nullptr;
   std::uint64_t seed = 1;
+  const std::vector<PlacedObstacle>* obstacles = nullptr;  ///< null: none
 };
 
 /// What an effect is expected to cost: for `effuse check`.

@@ -22,6 +22,8 @@ Scene read_scene(Parameters& root, std::span<const EffectKind> kinds) {
   scene.terrain_crs = terrain.text("crs", "", "coordinate system, when the file says none or a wrong one");
   scene.ground_temperature = terrain.number("temperature", "K", 288.15, {0, 5000, true}, "of the ground");
 
+  scene.obstacles = read_obstacles(root);
+
   for (const EffectKind& kind : kinds) {
     if (!root.has(kind.name)) continue;
     Parameters table = root.table(kind.name, kind.what);

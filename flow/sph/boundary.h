@@ -22,6 +22,8 @@ struct Wall {
   Vec3 velocity = Vec3::Zero();    ///< of the surface [m/s]
   Real temperature = 0;            ///< [K]; 0: none of its own
   Real friction = 1;               ///< factor of the drag along it: FilmFriction
+  bool mirrors = false;            ///< the pressure goes on along it beyond it, as in a mirror: pressure.h
+  Real part = 1, share = 1;        ///< of its gamma and of its other values that are its own, where walls meet: trim_walls()
 };
 
 /// The walls of every particle, one list after another.
@@ -127,17 +129,12 @@ class BoundaryTable {
     const auto mix = [t](Real x, Real y) { return x + t * (y - x); };
     return {mix(a.gamma, b.gamma), mix(a.slope, b.slope), mix(a.bend, b.bend), mix(a.drag_t, b.drag_t), mix(a.drag_n, b.drag_n), mix(a.moment_n, b.moment_n), mix(a.moment_t, b.moment_t)};
   }
-  /// The distance at which gamma is `value`, within +- support: the end beyond which there is none.
-  Real distance_of_gamma(Real value) const {
-    std::size_t low = 0, high = 2 * kNodes;
-    if (value >= row_[low].gamma) return -support_;
-    if (value <= 0) return support_;
-    while (high - low > 1) {
-      const std::size_t mid = (low + high) / 2;
-      (row_[mid].gamma >= value ? low : high) = mid;
-    }
-    const Real a = row_[low].gamma, b = row_[high].gamma;
-    return support_ / kNodes * (static_cast<Real>(low) - kNodes + (a > b ? (a - value) / (a - b) : 0));
+  /// A wall's own.
+  Row at(const Wall& wall) const {
+    Row row = at(wall.distance);
+    row.gamma *= wall.part;
+    for (Real* value : {&row.slope, &row.bend, &row.drag_t, &row.drag_n, &row.moment_n, &row.moment_t}) *value *= wall.share;
+    return row;
   }
   /// The distance in [0, support] at which -slope is `value`: how far off a plane free surface is when the gradient of
   /// the kernel's sum is that large. 0 for values above -slope(0); the support for 0 (the last layer is out of sight from

@@ -19,6 +19,7 @@ constexpr Real kUnseen = 1e9;   // depth of lava whose surface is far, in spacin
 constexpr Real kNearOff = 1.55;  // spacings below the free surface: nearer, its distance is sure
 constexpr Real kFlat = 0.05;     // of a full neighbourhood's moment: with less there is no gradient in that direction
 constexpr Real kNearestWall = 0.25;  // spacings: nearer walls shear no harder
+constexpr Real kSameFace = 0.6;  // cosine between the normals of two places of one face
 constexpr Real kLoose = 0.8;    // of the density: with less a particle is a drop or in a sheet
 constexpr Real kDrop = 4.83597586;  // area of a ball of the particle's volume, in faces: (36 pi)^(1/3); a sheet has 2
 }  // namespace
@@ -65,7 +66,7 @@ void find_shape(const ParticleSystem& s, Real lattice, const FilmFriction& film,
       Vec3 slope = slopes[i - begin];
       shape.grounded[i] = 0;
       for (const Wall& wall : walls[i]) {
-        const BoundaryTable::Row row = s.boundary->at(wall.distance);
+        const BoundaryTable::Row row = s.boundary->at(wall);
         sum += row.gamma;
         slope += row.slope * wall.normal;
         shape.grounded[i] = std::max(shape.grounded[i], face * share(wall.distance));
@@ -114,13 +115,15 @@ void bend_walls(const ParticleSystem& s, Walls& walls, std::vector<Real>& distan
   for (std::size_t w = 0; w < distances.size(); ++w) distances[w] = walls.walls[w].distance;
   const Real most = 0.5 * s.spacing;
   parallel_for(s.size(), [&](std::size_t i) {
+    const bool several = walls[i].size() > 1;
     for (Index w = walls.first[i]; w < walls.first[i + 1]; ++w) {
       const Wall wall = walls.walls[w];
       // Feet of the neighbours' perpendiculars on the same surface: on a sphere of radius R normals differ by feet / R.
       Real turn = 0, length = 0;
       for (const Index j : (*s.neighbors)[i]) {
         for (const Wall& other : walls[j]) {
-          if (other.surface != wall.surface) continue;
+          // Another face of the same solid, in a corner, is no turn of this one.
+          if (other.surface != wall.surface || ((several || walls[j].size() > 1) && other.normal.dot(wall.normal) < kSameFace)) continue;
           const Vec3 foot = s.separation<true>(j, i) - other.reach * other.normal + wall.reach * wall.normal;
           turn += (other.normal - wall.normal).dot(foot);
           length += foot.squaredNorm();
@@ -139,23 +142,21 @@ void trim_walls(const BoundaryTable& boundary, Walls& walls) {
   parallel_for(walls.first.size() - 1, [&](std::size_t i) {
     const std::span<Wall> own(walls.walls.data() + walls.first[i], walls.first[i + 1] - walls.first[i]);
     if (own.size() < 2) return;
-    // By distance; of equal ones in the order of the list.
-    std::array<Index, 16> order;
-    const std::size_t n = std::min(own.size(), order.size());
-    for (std::size_t k = 0; k < n; ++k) {
-      std::size_t at = k;
-      for (; at > 0 && own[order[at - 1]].distance > own[k].distance; --at) order[at] = order[at - 1];
-      order[at] = static_cast<Index>(k);
-    }
-    std::array<Real, 16> share;
-    for (std::size_t k = 0; k < n; ++k) share[k] = boundary.at(own[order[k]].distance).gamma / whole;
-    for (std::size_t b = 1; b < n; ++b) {
-      Real left = share[b];
-      for (std::size_t a = 0; a < b; ++a) {
-        const Real c = 2 / kPi * std::asin(std::clamp(own[order[a]].normal.dot(own[order[b]].normal), -1.0, 1.0)), product = share[a] * share[b];
-        left -= c >= 0 ? (1 - c) * product + c * std::min(share[a], share[b]) : (1 + c) * product;
+    const std::size_t n = std::min<std::size_t>(own.size(), 16);
+    std::array<Real, 16> gamma;
+    for (std::size_t k = 0; k < n; ++k) gamma[k] = boundary.at(own[k].distance).gamma / whole;
+    for (std::size_t a = 0; a < n; ++a)
+      for (std::size_t b = 0; b < n; ++b) {
+        if (a == b) continue;
+        const Real c = 2 / kPi * std::asin(std::clamp(own[a].normal.dot(own[b].normal), -1.0, 1.0));
+        // The lesser gives way; of equal ones the later.
+        const bool yields = gamma[a] != gamma[b] ? gamma[a] < gamma[b] : a > b;
+        own[a].share *= c >= 0 ? 1 - (1 - c) * gamma[b] - (yields ? c : 0) : 1 - (1 + c) * gamma[b];
+        if (yields) own[a].part *= c >= 0 ? 1 - (1 - c) * gamma[b] - c : 1 - (1 + c) * gamma[b];
       }
-      own[order[b]].distance = std::max(own[order[b]].distance, boundary.distance_of_gamma(std::max(left, 0.0) * whole));
+    for (Wall& wall : own) {
+      wall.share = std::max(wall.share, 0.0);
+      wall.part = std::max(wall.part, 0.0);
     }
   }, 2048);
 }
@@ -171,7 +172,7 @@ void shear_rate_squared(const ParticleSystem& s, Real slip_length, std::span<con
     for (std::size_t i = begin; i < end; ++i) {
       Mat3 gradient = gradients[i - begin], moment = moments[i - begin];
       for (const Wall& wall : (*s.walls)[i]) {
-        const BoundaryTable::Row row = s.boundary->at(wall.distance);
+        const BoundaryTable::Row row = s.boundary->at(wall);
         const Real depth = std::max(wall.distance, kNearestWall * s.spacing) + slip_length;
         const Mat3 across = wall.normal * wall.normal.transpose();
         gradient += row.moment_n / depth * (v[i] - wall.velocity) * wall.normal.transpose();

@@ -41,13 +41,13 @@ void find_shape(const ParticleSystem& system, Real lattice, const FilmFriction& 
 void bend_walls(const ParticleSystem& system, Walls& walls, std::vector<Real>& distances);
 
 /// Where two walls' half-spaces overlap, in a corner or where an obstacle stands in the ground, what lies behind both is counted once:
-/// the farther wall is moved away until its gamma lacks what it shares with the nearer one,
+/// to the sum they give gamma_a + gamma_b - gamma_ab, and to its gradient the gradient of that,
 ///
 ///   gamma_ab = (1 - c) gamma_a gamma_b + c min(gamma_a, gamma_b)  for c = 1 - 2 angle(n_a, n_b) / pi >= 0,   (1 + c) gamma_a gamma_b  below
 ///
 /// gammas as shares of the whole: exact on the edge itself, for walls of one plane (c = 1) or face to face (c = -1), and at right angles
-/// for kernels that are products of their coordinates; within 0.04 of the whole for ours. Of three walls each shares with every
-/// nearer one. For bend_walls()'s walls; changes `distance` alone.
+/// for kernels that are products of their coordinates; within 0.04 of the whole for ours. Of three walls each shares with both
+/// others. For bend_walls()'s walls; sets their part and share.
 void trim_walls(const BoundaryTable& boundary, Walls& walls);
 
 /// Shear rate squared, 2 D:D [1/s^2], D the symmetric part of the velocity's gradient

@@ -36,7 +36,8 @@ constexpr Real kTight = 0.25;          // times dt sqrt(g / dx): share of the di
 constexpr Real kSlow = 0.5;           // sqrt(g dx): slower lava all but stands
 constexpr Real kWake = 2;            // times sleep_speed
 constexpr int kNap = 16;             // steps of max_step that sleepers' heat takes at a time while nobody is awake
-constexpr std::string_view kModel = "modern 3";  // of a checkpoint: changes with what is saved
+constexpr int kSettle = 3;           // rounds between ground and obstacles, at most
+constexpr std::string_view kModel = "modern 4";  // of a checkpoint: changes with what is saved
 
 BoundaryTable make_table(KernelKind kind, Real support, Real spacing) {
   switch (kind) {
@@ -73,6 +74,7 @@ struct ModernLava::Impl {
   Census census;
   MaterialFrames frames;
   Ground ground;
+  Solids solids;
   Emitter emitter;
   Heat heat;
   Real time = 0, acceleration = 0;      // largest, of the last step
@@ -83,6 +85,7 @@ struct ModernLava::Impl {
   Real reported_enthalpy = 0;
   std::uint64_t reported_left = 0;
   std::uint64_t steps = 0;
+  Real solid_speed = 0;                 // of the obstacles' surfaces beside lava, in the last step [m/s]
 
   // Of the step: the particles it looks at, by place in `set`.
   AwakeSet set;
@@ -100,7 +103,7 @@ struct ModernLava::Impl {
   // What points() shows.
   mutable std::vector<Real> radius, crust, age, p;
 
-  Impl(const ModernOptions& options, std::vector<Vent> vents, std::vector<ContactSource> sources, std::function<bool(const Vec3&)> inside)
+  Impl(const ModernOptions& options, std::vector<Vent> vents, std::vector<ContactSource> sources, std::function<bool(const Vec3&)> inside, const SolidOptions& solid_options)
       : o(options),
         support(o.support * o.spacing),
         volume(std::pow(o.spacing, 3)),
@@ -110,6 +113,7 @@ struct ModernLava::Impl {
         film(table, o.spacing),
         frames(o.rest_period),
         ground({support, std::isfinite(o.ground_speed) ? kLook * support : support, kClearance * o.spacing, 8}, std::move(sources), std::move(inside)),
+        solids(solid_options, kClearance * o.spacing),
         emitter(std::move(vents), o.spacing, o.seed, ground.sources()),
         heat(o.heat, o.spacing, o.density) {
     CHECK_GT(o.spacing, 0.0);
@@ -194,6 +198,7 @@ struct ModernLava::Impl {
     io.value("reported_enthalpy", self.reported_enthalpy);
     io.value("reported_left", self.reported_left);
     io.value("steps", self.steps);
+    io.value("solid_speed", self.solid_speed);
   }
 
   ParticleSystem system() {
@@ -278,6 +283,7 @@ struct ModernLava::Impl {
       });
       walls.first[k + 1] = static_cast<Index>(walls.walls.size());
     }
+    solids.add_walls(lx, support, walls);
   }
 
   /// Everything that depends on positions alone.
@@ -288,6 +294,7 @@ struct ModernLava::Impl {
     const ParticleSystem s = system();
     pairs.build(s);
     bend_walls(s, walls, wall_distances);
+    if (solids.any()) trim_walls(table, walls);
     find_shape(s, lattice, film, walls, shape);
     pressure.prepare(s);
     const std::size_t moving = set.awake + set.drowsy;
@@ -398,6 +405,7 @@ struct ModernLava::Impl {
     Real dt = o.max_step;
     const Real speed = largest_norm(v);
     if (speed > 0) dt = std::min(dt, o.courant * o.spacing / speed);
+    if (solid_speed > 0) dt = std::min(dt, o.courant * o.spacing / solid_speed);
     if (acceleration > 0) dt = std::min(dt, o.courant * std::sqrt(o.spacing / acceleration));
     // Lava that all but stands has waves, too, from particle to particle, unless viscosity swallows them within such a step.
     const Real g = o.gravity.norm();
@@ -474,7 +482,8 @@ struct ModernLava::Impl {
     if (dt_max - dt < 1e-6 * dt) dt = dt_max;  // no crumb of a step is left over
     if (dt < dt_max && dt < o.min_step)
       throw UnstableError(fmt::format("at t = {:.6g} s speed or acceleration leave a step of {:.3g} s, less than min_step {:.3g} s ({} particles)", time, dt, o.min_step, size()));
-    wake_by_walls();
+    if (solids.any()) solids.stand(time, dt);
+    wake_by_walls(dt);
     const bool all_asleep = std::find(asleep.begin(), asleep.end(), 0) == asleep.end();
     if (!all_asleep) catch_up_unreported();
     if (steps % kSortInterval == 0 && !all_asleep) {
@@ -527,12 +536,35 @@ struct ModernLava::Impl {
     acceleration = std::sqrt(parallel_max(set.awake, 0, [&](std::size_t k) { return ((lv[k] - start[k]) / dt).squaredNorm(); }));
     ground.moved(all ? lx : before_x, x, dt * o.ground_speed);
     ground.project(x, v, [&](std::size_t i) { return !emitter.held(i) && !asleep[i]; });
+    if (solids.any()) pass_solids(all ? lx : before_x, dt, report);
     fall_asleep(dt);
     wrap();
     heat_step(dt, report);
     report.neighbor_pairs = neighbors.pairs();
     finish(dt, report);
     return report;
+  }
+
+  /// From `from` to x among the obstacles; and out of the ground where those have led them in.
+  void pass_solids(std::span<const Vec3> from, Real dt, ModernReport& report) {
+    solid_speed = solids.speed();
+    solids.go(time, dt);
+    std::vector<Index> which;
+    for (std::size_t k = 0; k < set.awake; ++k)
+      if (!emitter.held(set.particles[k])) which.push_back(set.particles[k]);
+    std::vector<Vec3> wanted = x;
+    report.solids = solids.slide(which, from, x, v);
+    if (report.solids.near == 0) return;
+    ground.moved(wanted, x);
+    // Obstacles have the last word: what they keep in the ground waits for the next step.
+    for (int round = 0; round < kSettle; ++round) {
+      wanted = x;
+      if (ground.project(x, v, [&](std::size_t i) { return !emitter.held(i) && !asleep[i]; }).pushed == 0) return;
+      const std::vector<Vec3> projected = x;
+      solids.rest();
+      if (solids.slide(which, wanted, x, v).near == 0) return;
+      ground.moved(projected, x);
+    }
   }
 
   /// A step in which nobody moves: heat, by many at a time, and vents.
@@ -557,8 +589,18 @@ struct ModernLava::Impl {
   }
 
   /// Sleepers that a moving surface has come near to.
-  void wake_by_walls() {
-    if (o.ground_speed <= 0 || std::find(asleep.begin(), asleep.end(), 1) == asleep.end()) return;
+  void wake_by_walls(Real dt) {
+    const bool moving = solids.any() && solids.fastest() > 0;
+    if ((o.ground_speed <= 0 && !moving) || std::find(asleep.begin(), asleep.end(), 1) == asleep.end()) return;
+    if (moving) {
+      const Real reach = support + dt * solids.fastest();
+      parallel_for(size(), [&](std::size_t i) {
+        if (!asleep[i] || !solids.disturbs(x[i], reach)) return;
+        asleep[i] = 0;
+        slow[i] = 0;
+      });
+    }
+    if (o.ground_speed <= 0) return;
     ground.find(x, [&](std::size_t i) { return asleep[i] != 0; });
     for (std::size_t i = 0; i < size(); ++i) {
       if (!asleep[i]) continue;
@@ -625,8 +667,9 @@ struct ModernLava::Impl {
   }
 };
 
-ModernLava::ModernLava(const ModernOptions& options, std::vector<Vent> vents, std::vector<ContactSource> ground, std::function<bool(const Vec3&)> inside)
-    : impl_(std::make_unique<Impl>(options, std::move(vents), std::move(ground), std::move(inside))) {}
+ModernLava::ModernLava(const ModernOptions& options, std::vector<Vent> vents, std::vector<ContactSource> ground, std::function<bool(const Vec3&)> inside,
+                       const SolidOptions& solids)
+    : impl_(std::make_unique<Impl>(options, std::move(vents), std::move(ground), std::move(inside), solids)) {}
 ModernLava::~ModernLava() = default;
 ModernLava::ModernLava(ModernLava&&) noexcept = default;
 ModernLava& ModernLava::operator=(ModernLava&&) noexcept = default;
@@ -706,7 +749,7 @@ std::size_t ModernLava::memory() const {
   const Impl& m = *impl_;
   const auto bytes = [](const auto&... vectors) { return ((vectors.capacity() * sizeof(vectors[0])) + ...); };
   return bytes(m.x, m.v, m.q, m.mu, m.density, m.exposed, m.grounded, m.ground_T, m.slow, m.surface, m.asleep) + m.census.memory() + m.frames.memory() +
-         m.ground.memory() + m.emitter.memory() + m.heat.memory() + m.grid.memory() + m.neighbors.memory() + m.pairs.memory() + m.shape.memory() + m.viscosity.memory() +
+         m.ground.memory() + m.solids.memory() + m.emitter.memory() + m.heat.memory() + m.grid.memory() + m.neighbors.memory() + m.pairs.memory() + m.shape.memory() + m.viscosity.memory() +
          m.pressure.memory() + bytes(m.set.particles, m.walls.first, m.walls.walls, m.lx, m.lv, m.start, m.predicted, m.viscous_v, m.lq, m.lmu, m.rate, m.least,
                                      m.scratch, m.wall_distances, m.fixed, m.before_x, m.radius, m.crust, m.age, m.p);
 }

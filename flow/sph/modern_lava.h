@@ -11,6 +11,7 @@
 #include "flow/sph/heat.h"
 #include "flow/sph/kernel.h"
 #include "flow/sph/rheology.h"
+#include "flow/sph/solids.h"
 #include "flow/sph/vent.h"
 #include "geometry/base/hash.h"
 #include "geometry/base/state_io.h"
@@ -64,6 +65,7 @@ struct ModernReport {
   Real density_error = 0;      ///< rms over particles of max(rho - rho0, 0) / rho0, before the step
   Real max_speed = 0;          ///< [m/s]
   Real max_temperature = 0, min_temperature = 0;  ///< [K]
+  geometry::SlideReport solids;  ///< particles that came near obstacles
   HeatBudget heat;             ///< [J]
 };
 
@@ -76,7 +78,7 @@ struct ModernReport {
 ///                                                      where it is low it may fill up; q' >= 0
 ///   x'          = x + dt v' + shift                    shift takes density back that is too large (the same solver, as a
 ///                                                      displacement: it gives no speed)
-///   hard projection out of the ground, heat, vents
+///   hard projection out of the ground; past obstacles by sweeping (Solids), whatever the step; heat, vents
 ///
 /// The old pressure acts before viscosity is solved: in steady flow q' = q, and velocity and pressure fulfil the momentum
 /// equation together, whatever the step (incremental pressure correction; Guermond, Minev & Shen 2006, Comput. Methods
@@ -84,7 +86,7 @@ struct ModernReport {
 ///
 /// Sleep: a particle slower than sleep_speed for sleep_delay is left where it is: no neighbours, no pressure, no viscosity.
 /// The sleepers within reach of those awake are moved along in the solves; one that would go faster than twice
-/// sleep_speed wakes, and so does one that a moving surface comes within a support of. Heat goes on (see Heat), in all; while everything sleeps and no vent is open it takes 16 max_step at
+/// sleep_speed wakes, and so does one that a moving surface comes, or an obstacle may come in the step, within a support of. Heat goes on (see Heat), in all; while everything sleeps and no vent is open it takes 16 max_step at
 /// a time, and temperatures lie behind by up to that.
 ///
 /// Deterministic: the same bits on any number of threads. Not thread-safe itself.
@@ -94,7 +96,9 @@ class ModernLava {
 
   /// Checks the options. inside: whether a point has ground above or below it; surface particles that come off the ground
   /// where there is none are taken out and counted, a few steps later. Empty: none leave.
-  ModernLava(const ModernOptions& options, std::vector<Vent> vents, std::vector<ContactSource> ground, std::function<bool(const Vec3&)> inside = {});
+  /// solids: obstacles beside the ground.
+  ModernLava(const ModernOptions& options, std::vector<Vent> vents, std::vector<ContactSource> ground, std::function<bool(const Vec3&)> inside = {},
+             const SolidOptions& solids = {});
   ~ModernLava();
   ModernLava(ModernLava&&) noexcept;
   ModernLava& operator=(ModernLava&&) noexcept;

@@ -1,5 +1,6 @@
 #include "flow/sph/pressure.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <algorithm>
 #include <array>
@@ -23,6 +24,7 @@ constexpr int kBrief = 4;           // iterations of a solve that is within its 
 constexpr Real kMargin = 0.1;      // of the tolerance, where single precision alone does not reach it
 constexpr Real kGain = 0.5;        // a round of refinement that leaves more was the last
 constexpr Real kFloatNoise = 6e-8;  // of a product's terms: rounding in single precision
+constexpr Real kLeastOwn = 0.2;    // share of the kernel that lava in a corner has at least
 constexpr Real kTrust = 1e-3;      // of the tolerance: more noise is looked into
 
 /// Sum of f(i), eight in turn: lanes for the compiler, one order on every processor.
@@ -51,14 +53,31 @@ float lane_min(std::size_t begin, std::size_t end, F&& f) {
 
 }  // namespace
 
-void compression_rate(const ParticleSystem& s, std::span<const Vec3> v, std::span<Real> out) {
-  CHECK_EQ(v.size(), s.size());
+namespace {
+bool any_mirrors(std::span<const Wall> walls) {
+  return std::any_of(walls.begin(), walls.end(), [](const Wall& wall) { return wall.mirrors; });
+}
+}  // namespace
+
+Mat3 mirrored(const ParticleSystem& s, std::size_t i) {
+  if (!any_mirrors((*s.walls)[i])) return Mat3::Identity();
+  Mat3 own = Mat3::Identity();
+  for (const Wall& wall : (*s.walls)[i])
+    if (wall.mirrors) own -= s.boundary->at(wall).moment_t * (Mat3::Identity() - wall.normal * wall.normal.transpose());
+  const Eigen::SelfAdjointEigenSolver<Mat3> eigen(own);
+  return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(kLeastOwn).cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose();
+}
+
+void compression_rate(const ParticleSystem& s, std::span<const Vec3> velocities, std::span<Real> out) {
+  CHECK_EQ(velocities.size(), s.size());
   CHECK_EQ(out.size(), s.size());
   const PairsOf pairs(s);
+  std::vector<Vec3> v(velocities.begin(), velocities.end());
+  parallel_for(s.size(), [&](std::size_t i) { v[i] = mirrored(s, i) * v[i]; }, 2048);
   parallel_ranges(s.size(), kGrain, [&](std::size_t begin, std::size_t end) {
     pairs->divergence(begin, end, v, out);
     for (std::size_t i = begin; i < end; ++i)
-      for (const Wall& wall : (*s.walls)[i]) out[i] += 2 * s.boundary->at(wall.distance).slope * wall.normal.dot(v[i] - wall.velocity);
+      for (const Wall& wall : (*s.walls)[i]) out[i] += 2 * s.boundary->at(wall).slope * wall.normal.dot(velocities[i] - wall.velocity);
   });
 }
 
@@ -69,8 +88,8 @@ void pressure_acceleration(const ParticleSystem& s, std::span<const Real> q, std
   parallel_ranges(s.size(), kGrain, [&](std::size_t begin, std::size_t end) {
     pairs->gradient(begin, end, q, out);
     for (std::size_t i = begin; i < end; ++i) {
-      Vec3 sum = out[i];
-      for (const Wall& wall : (*s.walls)[i]) sum += 2 * q[i] * s.boundary->at(wall.distance).slope * wall.normal;
+      Vec3 sum = any_mirrors((*s.walls)[i]) ? Vec3(mirrored(s, i) * out[i]) : out[i];
+      for (const Wall& wall : (*s.walls)[i]) sum += 2 * q[i] * s.boundary->at(wall).slope * wall.normal;
       out[i] = -sum;
     }
   });
@@ -116,6 +135,9 @@ void PressureSolver::prepare(const ParticleSystem& s) {
   partial_.resize((n + kGrain - 1) / kGrain);
   push_.resize(s.walls->walls.size());
   pairs_.build(s);
+  mirrored_.clear();
+  for (std::size_t i = 0; i < n; ++i)
+    if (any_mirrors((*s.walls)[i])) mirrored_.push_back({static_cast<Index>(i), mirrored(s, i), Eigen::Vector3f::Zero()});
 
   // Diagonal of A, by which the unknowns are scaled: q = scale y. And what walls push, once.
   parallel_for(n, [&](std::size_t i) { pairs_.set(i, s.is_fixed(i) ? 0.0f : 1.0f); }, 4096);
@@ -125,13 +147,15 @@ void PressureSolver::prepare(const ParticleSystem& s) {
       Real diagonal = scale_[i];
       Vec3 slope(a_[i].x, a_[i].y, a_[i].z);
       for (Index k = s.walls->first[i]; k < s.walls->first[i + 1]; ++k) {
-        push_[k] = 2 * s.boundary->at(s.walls->walls[k].distance).slope * s.walls->walls[k].normal;
+        push_[k] = 2 * s.boundary->at(s.walls->walls[k]).slope * s.walls->walls[k].normal;
         slope += push_[k];
       }
       if (!s.is_fixed(i)) diagonal += slope.squaredNorm();
       scale_[i] = diagonal > 0 ? static_cast<float>(1 / std::sqrt(diagonal)) : 0;
     }
   });
+  // An estimate, on the safe side, will do.
+  for (const Mirrored& m : mirrored_) scale_[m.particle] /= static_cast<float>(m.P.trace() / 3);
 }
 
 /// a_ = -D^T of the packed q = scale p, 0 for fixed particles.
@@ -141,6 +165,11 @@ void PressureSolver::accelerate(const ParticleSystem& s) {
   parallel_ranges(y_.size(), kGrain, [&](std::size_t begin, std::size_t end) {
     pairs_.gradient(begin, end, a_);
     for (std::size_t i = begin; i < end; ++i) a[i] = {-a[i].x, -a[i].y, -a[i].z, 0};
+    for (auto m = std::lower_bound(mirrored_.begin(), mirrored_.end(), begin, [](const Mirrored& one, std::size_t i) { return one.particle < i; });
+         m != mirrored_.end() && m->particle < end; ++m) {
+      const Eigen::Vector3f turned = m->P.cast<float>() * Eigen::Vector3f(a[m->particle].x, a[m->particle].y, a[m->particle].z);
+      a[m->particle] = {turned.x(), turned.y(), turned.z(), 0};
+    }
     for (Index k = first[begin], i = static_cast<Index>(begin); k < first[end]; ++k) {
       while (k >= first[i + 1]) ++i;
       const Eigen::Vector3f push = scale_[i] * p_[i] * push_[k].cast<float>();
@@ -155,15 +184,24 @@ void PressureSolver::accelerate(const ParticleSystem& s) {
 /// Ap = scale A scale p, with scale p packed; returns p . Ap and p . g.
 PressureSolver::Sums PressureSolver::multiply(const ParticleSystem& s) {
   accelerate(s);
+  for (Mirrored& m : mirrored_) {
+    FloatPairs::Vector& a = a_[m.particle];
+    m.kept = {a.x, a.y, a.z};
+    const Eigen::Vector3f turned = m.P.cast<float>() * m.kept;
+    a = {turned.x(), turned.y(), turned.z(), 0};
+  }
   const Index* first = s.walls->first.data();
   const float *scale = scale_.data(), *g = g_.data(), *p = p_.data();
   float* Ap = Ap_.data();
   return sum_of([&](std::size_t begin, std::size_t end) {
     pairs_.divergence(begin, end, a_, Ap_);
+    auto m = std::lower_bound(mirrored_.begin(), mirrored_.end(), begin, [](const Mirrored& one, std::size_t i) { return one.particle < i; });
     for (Index k = first[begin], i = static_cast<Index>(begin); k < first[end]; ++k) {
       while (k >= first[i + 1]) ++i;
+      while (m != mirrored_.end() && m->particle < i) ++m;
       const Eigen::Vector3f push = push_[k].cast<float>();
-      Ap[i] += push.x() * a_[i].x + push.y() * a_[i].y + push.z() * a_[i].z;
+      const Eigen::Vector3f a = m != mirrored_.end() && m->particle == i ? m->kept : Eigen::Vector3f(a_[i].x, a_[i].y, a_[i].z);
+      Ap[i] += push.x() * a.x() + push.y() * a.y() + push.z() * a.z();
     }
     for (std::size_t i = begin; i < end; ++i) Ap[i] *= -scale[i];
     Sums sum;
@@ -290,10 +328,16 @@ PressureResult PressureSolver::solve_prepared(const ParticleSystem& s, std::span
 
   bool first = true;
   for (Real last = std::numeric_limits<Real>::infinity();;) {
+    std::span<const Vec3> flow = v;
+    if (!mirrored_.empty()) {
+      flow_.assign(v.begin(), v.end());
+      for (const Mirrored& m : mirrored_) flow_[m.particle] = m.P * v[m.particle];
+      flow = flow_;
+    }
     // Of half y A y - b y the gradient at the pressures that have acted is (rate - D v) / dt.
     const Real start = sum_of([&](std::size_t begin, std::size_t end) {
       std::array<Real, kGrain> compression;
-      pairs.divergence(begin, end, v, std::span(compression).first(end - begin));
+      pairs.divergence(begin, end, flow, std::span(compression).first(end - begin));
       Sums sum;
       for (std::size_t i = begin; i < end; ++i) {
         Real rate_i = compression[i - begin];
@@ -336,9 +380,11 @@ PressureResult PressureSolver::solve_prepared(const ParticleSystem& s, std::span
     parallel_ranges(n, kGrain, [&](std::size_t begin, std::size_t end) {
       std::array<Vec3, kGrain> gradient;
       pairs.gradient(begin, end, change_, std::span(gradient).first(end - begin));
+      auto m = std::lower_bound(mirrored_.begin(), mirrored_.end(), begin, [](const Mirrored& one, std::size_t i) { return one.particle < i; });
       for (std::size_t i = begin; i < end; ++i) {
         if (s.is_fixed(i)) continue;
-        Vec3 sum = gradient[i - begin];
+        while (m != mirrored_.end() && m->particle < i) ++m;
+        Vec3 sum = m != mirrored_.end() && m->particle == i ? Vec3(m->P * gradient[i - begin]) : gradient[i - begin];
         for (Index k = s.walls->first[i]; k < s.walls->first[i + 1]; ++k) sum += change_[i] * push_[k];
         v[i] -= dt * sum;
       }
@@ -379,7 +425,7 @@ PressureResult PressureSolver::displace(const ParticleSystem& s, std::span<const
 
 std::size_t PressureSolver::memory() const {
   return pairs_.memory() + (y_.capacity() + low_.capacity() + scale_.capacity() + g_.capacity() + p_.capacity() + Ap_.capacity()) * sizeof(float) +
-         a_.capacity() * sizeof(FloatPairs::Vector) + push_.capacity() * sizeof(Vec3) + change_.capacity() * sizeof(Real) + partial_.capacity() * sizeof(Sums);
+         a_.capacity() * sizeof(FloatPairs::Vector) + push_.capacity() * sizeof(Vec3) + mirrored_.capacity() * sizeof(Mirrored) + flow_.capacity() * sizeof(Vec3) + change_.capacity() * sizeof(Real) + partial_.capacity() * sizeof(Sums);
 }
 
 }  // namespace effuse::flow::sph

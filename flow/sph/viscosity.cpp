@@ -23,7 +23,7 @@ struct WallDrag {
 WallDrag wall_drag(const BoundaryTable& table, const Wall& wall, Real slip_length, Real spacing) {
   const Real d = std::max(wall.distance, kNearest * spacing);
   const BoundaryTable::Row row = table.at(d);
-  return {wall.friction * row.drag_t / (d + slip_length), row.drag_n / d};
+  return {wall.share * wall.friction * row.drag_t / (d + slip_length), wall.share * row.drag_n / d};
 }
 
 /// The walls' drag on i at velocity v [N/m^3].

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdlib>
 #include <string>
 #include <utility>
@@ -20,10 +21,13 @@ inline Node scene_value(const std::string& value, const Place& place) {
     node.flag = value == "true";
     return node;
   }
-  if (value.starts_with('[')) {  // of two numbers
+  if (value.starts_with('[')) {  // of numbers
     node.kind = Node::Kind::kArray;
-    const std::size_t comma = value.find(',');
-    node.items = {scene_value(value.substr(1, comma - 1), place), scene_value(value.substr(comma + 1, value.size() - comma - 2), place)};
+    for (std::size_t from = 1; from < value.size();) {
+      const std::size_t to = std::min(value.find(',', from), value.size() - 1), first = value.find_first_not_of(' ', from);
+      node.items.push_back(scene_value(value.substr(first, to - first), place));
+      from = to + 1;
+    }
     return node;
   }
   char* end = nullptr;

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "flow/scene/parameters.h"
+#include "geometry/collide/collision_mesh.h"
+#include "geometry/motion/pose_track.h"
+#include "geometry/terrain/terrain.h"
+
+namespace effuse::flow {
+
+/// A mesh that stands or moves in a scene, as its table [[obstacle]] describes it.
+struct PlannedObstacle {
+  std::string name;  ///< for people and files: the table's, or else the file's
+  std::string file;  ///< as written; relative to the scene file
+  Place file_place, place;
+  Real scale = 1;     ///< of the mesh's numbers
+  bool y_up = false;  ///< the mesh's own axis
+  bool on_ground = true;  ///< heights count from the terrain under the place
+  std::vector<geometry::PoseKey> keys;  ///< in the terrain file's coordinates
+  geometry::KeyMotion motion = geometry::KeyMotion::kSmooth;
+  Real temperature = 0;  ///< of its surface [K]; 0: the ground's
+  Real friction = 1;     ///< of lava on it: 1 no slip, 0 free slip
+};
+
+/// The tables [[obstacle]] of a scene, each with its [[obstacle.key]]s. Faults stay in root.
+std::vector<PlannedObstacle> read_obstacles(Parameters& root);
+
+/// An obstacle in the world: metres, z up, from the terrain's origin.
+struct PlacedObstacle {
+  std::string name;
+  geometry::CollisionMesh shape;
+  geometry::PoseTrack track;
+  Real temperature = 0;
+  Real friction = 1;
+};
+
+/// The mesh of a plan's file, put on its terrain. What does not fit (no ground under it, times that do not rise, a mesh that is
+/// none) is a fault at the plan's place; the obstacle is then left out.
+void place_obstacle(const PlannedObstacle& plan, geometry::TriMesh mesh, const geometry::Terrain& terrain, std::vector<PlacedObstacle>& placed, std::vector<Fault>& faults);
+
+}  // namespace effuse::flow

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "flow/sph/boundary.h"
+#include "geometry/collide/obstacles.h"
+#include "geometry/collide/slide.h"
+
+namespace effuse::flow::sph {
+
+/// Obstacles as lava meets them: any meshes, standing or moving, beside the ground.
+///
+///   obstacles  not owned; must outlive the lava and stand still while it steps. Surfaces' numbers are from 1 on
+///   move       sets the obstacles' motions to their way from one moment to another and calls update(); empty: nothing moves
+///   friction   by surface number: factor of the drag along it, 1 no slip, 0 free slip; shorter lists: 1
+struct SolidOptions {
+  geometry::Obstacles* obstacles = nullptr;
+  std::function<void(Real from, Real to)> move;
+  std::vector<Real> friction;
+};
+
+/// The lava's side of its obstacles: walls for the sums, and moves that go through nothing.
+///
+/// Unlike the ground it keeps no bounds from step to step: what is near is asked each step, at one box test a particle where
+/// obstacles are far. The same bits on any number of threads.
+///
+/// Known limit: at the inner edges of a vessel the sums still miss a little; lava at rest in it creeps round by 0.08 g spacing^2 / nu.
+class Solids {
+ public:
+  /// radius: particles' centres stay so far off surfaces where there is room [m].
+  Solids(const SolidOptions& options, Real radius);
+
+  bool any() const { return options_.obstacles != nullptr && !options_.obstacles->empty(); }
+
+  /// Obstacles stand where they are at `time` and have the velocities of their way to time + dt.
+  void stand(Real time, Real dt);
+  /// Obstacles go from time to time + dt.
+  void go(Real time, Real dt);
+
+  /// Obstacles stand where their way has ended.
+  void rest();
+  /// No point of any obstacle goes faster in the step of stand() [m/s].
+  Real fastest() const { return fastest_; }
+
+  /// Appends to each particle's walls those of obstacles within reach [m]. x: the particles', as walls has them.
+  void add_walls(std::span<const Vec3> x, Real reach, Walls& walls);
+  /// The fastest surface among the walls last added [m/s].
+  Real speed() const { return speed_; }
+  /// Whether a moving surface is within reach of x.
+  bool disturbs(const Vec3& x, Real reach) const;
+
+  /// Particles `which` that would go from `before` to `x` (by particle, all of them), velocities v: stopped, carried, led along by the
+  /// obstacles on their way; x and v changed. Obstacles must be going (go()).
+  geometry::SlideReport slide(std::span<const Index> which, std::span<const Vec3> before, std::span<Vec3> x, std::span<Vec3> v);
+  std::size_t memory() const;
+
+ private:
+  static constexpr int kMost = 4;  // surfaces that a particle feels at a time
+
+  SolidOptions options_;
+  Real radius_;
+  Real speed_ = 0, fastest_ = 0;
+  std::vector<Index> near_;
+  std::vector<Vec3> at_, way_, speed_at_;
+  std::vector<geometry::Contact> contacts_;
+  std::vector<Index> count_;
+  Walls merged_;
+};
+
+}  // namespace effuse::flow::sph

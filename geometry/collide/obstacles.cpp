@@ -1,0 +1,156 @@
+#include "geometry/collide/obstacles.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "geometry/base/check.h"
+#include "geometry/base/parallel.h"
+#include "geometry/base/zones.h"
+#include "geometry/collide/obstacles_internal.h"
+
+namespace effuse::geometry {
+
+Obstacles::Obstacles() : impl_(std::make_unique<Impl>()) {}
+Obstacles::~Obstacles() = default;
+Obstacles::Obstacles(Obstacles&&) noexcept = default;
+Obstacles& Obstacles::operator=(Obstacles&&) noexcept = default;
+
+std::size_t Obstacles::add(Obstacle obstacle) {
+  const std::size_t number = impl_->all.size();
+  impl_->all.emplace_back(std::move(obstacle));
+  impl_->place.emplace_back();
+  impl_->changed.push_back(static_cast<Index>(number));
+  ++impl_->left;
+  return number;
+}
+
+void Obstacles::move(std::size_t i, const RigidMotion& motion) {
+  CHECK_LT(i, size());
+  CHECK(impl_->all[i].has_value());
+  impl_->all[i]->motion = motion;
+  impl_->changed.push_back(static_cast<Index>(i));
+}
+
+void Obstacles::set_temperature(std::size_t i, Real kelvin) {
+  CHECK_LT(i, size());
+  CHECK(impl_->all[i].has_value());
+  impl_->all[i]->temperature = kelvin;
+}
+
+void Obstacles::remove(std::size_t i) {
+  CHECK_LT(i, size());
+  if (!impl_->all[i]) return;
+  impl_->all[i].reset();
+  impl_->changed.push_back(static_cast<Index>(i));
+  --impl_->left;
+}
+
+void Obstacles::update() {
+  if (impl_->changed.empty()) return;
+  for (const Index i : impl_->changed) {
+    Impl::Place& place = impl_->place[i];
+    const auto& obstacle = impl_->all[i];
+    place.there = obstacle.has_value();
+    if (!obstacle) {
+      impl_->boxes.remove(i);
+      continue;
+    }
+    place.now = placed_box(obstacle->motion.to(), obstacle->shape.bounds());
+    place.swept = obstacle->motion.swept_box(obstacle->shape.bounds());
+    impl_->boxes.set(i, place.swept);
+  }
+  impl_->changed.clear();
+  impl_->tree = impl_->boxes.flat();
+  impl_->now = impl_->swept = Box3();
+  for (const Impl::Place& place : impl_->place) {
+    if (!place.there) continue;
+    impl_->now.extend(place.now);
+    impl_->swept.extend(place.swept);
+  }
+}
+
+std::size_t Obstacles::size() const { return impl_->all.size(); }
+bool Obstacles::empty() const { return impl_->left == 0; }
+
+const Obstacle& Obstacles::operator[](std::size_t i) const {
+  CHECK_LT(i, size());
+  CHECK(impl_->all[i].has_value());
+  return *impl_->all[i];
+}
+
+Box3 Obstacles::bounds() const {
+  CHECK(impl_->up_to_date());
+  return impl_->now;
+}
+
+Box3 Obstacles::swept_bounds() const {
+  CHECK(impl_->up_to_date());
+  return impl_->swept;
+}
+
+void Obstacles::meeting(const Box3& box, std::vector<Index>& out) const {
+  CHECK(impl_->up_to_date());
+  out.clear();
+  impl_->tree.meeting(box, [&](Index i) {
+    if (impl_->place[i].swept.intersects(box)) out.push_back(i);
+    return true;
+  });
+  std::sort(out.begin(), out.end());
+}
+
+int Obstacles::contacts(const Vec3& point, Real reach, std::span<Contact> out) const {
+  CHECK(impl_->up_to_date());
+  std::fill(out.begin(), out.end(), Contact{});
+  // One box test, where nothing is near; false for NaN too.
+  if (out.empty() || !(impl_->now.squaredExteriorDistance(point) <= reach * reach)) return 0;
+
+  // The best so far, with the obstacles' numbers: by distance, surface, number.
+  constexpr std::size_t kMost = 16;
+  CHECK_LE(out.size(), kMost);
+  std::array<Index, kMost> number{};
+  std::size_t count = 0;
+  impl_->tree.nearest(point, reach * reach, [&](Index i, Real& limit2) {
+    const Obstacle& obstacle = *impl_->all[i];
+    const Real gap2 = impl_->place[i].now.squaredExteriorDistance(point);
+    if (gap2 > limit2) return;
+    const RigidPose& pose = obstacle.motion.to();
+    // In its box the point may be in itself, deeper than any other is away.
+    const auto nearest = obstacle.shape.nearest(pose.body(point), gap2 > 0 ? std::min(reach, std::sqrt(limit2) * (1 + 1e-12)) : reach);
+    if (!nearest) return;
+    const auto before = [&](std::size_t k) {
+      if (nearest->distance != out[k].distance) return nearest->distance < out[k].distance;
+      return obstacle.surface != out[k].surface ? obstacle.surface < out[k].surface : i < number[k];
+    };
+    std::size_t slot = std::min(count, out.size() - 1);
+    if (count == out.size() && !before(slot)) return;
+    count = std::min(count + 1, out.size());
+    for (; slot > 0 && before(slot - 1); --slot) {
+      out[slot] = out[slot - 1];
+      number[slot] = number[slot - 1];
+    }
+    number[slot] = i;
+    Contact& contact = out[slot];
+    contact.point = pose.world(nearest->point);
+    contact.normal = pose.orientation * nearest->normal;
+    contact.distance = nearest->distance;
+    contact.surface_velocity = obstacle.motion.velocity_at(contact.point, 1);
+    contact.surface_temperature = obstacle.temperature;
+    contact.surface = obstacle.surface;
+    if (count == out.size()) {
+      const Real furthest = std::max(Real{0}, out[count - 1].distance);
+      limit2 = std::min(limit2, furthest * furthest);
+    }
+  });
+  return static_cast<int>(count);
+}
+
+void Obstacles::contacts(std::span<const Vec3> points, Real reach, int per_point, std::span<Contact> out) const {
+  ZONE("collide.contacts");
+  CHECK_GE(per_point, 1);
+  const auto each = static_cast<std::size_t>(per_point);
+  CHECK_EQ(out.size(), points.size() * each);
+  CHECK_GE(reach, 0.0);
+  parallel_for(points.size(), [&](std::size_t i) { contacts(points[i], reach, out.subspan(i * each, each)); }, 512);
+}
+
+}  // namespace effuse::geometry
