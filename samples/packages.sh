@@ -9,7 +9,7 @@ build_packages="
   libcgal-dev libeigen3-dev libassimp-dev libopenvdb-dev libboost-iostreams-dev libtbb-dev libfcl-dev libembree-dev
   libcli11-dev libtomlplusplus-dev libfmt-dev nlohmann-json3-dev libpng-dev zlib1g-dev libcairo2-dev"
 test_packages="
-  libgtest-dev libgmock-dev libbenchmark-dev assimp-utils libopenvdb-tools ca-certificates"
+  libgtest-dev libgmock-dev libbenchmark-dev libbullet-dev assimp-utils libopenvdb-tools ca-certificates"
 
 case "${1:-build}" in
   build) wanted=$build_packages ;;
