@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "flow/effects/lava_rheology.h"
-#include "flow/effects/moving_obstacles.h"
+#include "flow/effects/solid_world.h"
 #include "flow/sph/lava_presets.h"
 #include "flow/sph/modern_lava.h"
 #include "geometry/base/parallel.h"
@@ -33,7 +33,7 @@ std::vector<std::string> names(const std::string_view (&list)[N]) {
 class ModernLavaEffect final : public Effect {
  public:
   ModernLavaEffect(const ModernOptions& options, const std::vector<Vent>& vents, const geometry::Terrain& terrain, const std::vector<PlacedObstacle>& obstacles)
-      : obstacles_(std::make_unique<MovingObstacles>(obstacles)),
+      : obstacles_(std::make_unique<SolidWorld>(obstacles, std::vector<PlacedBody>{}, &terrain)),
         lava_(options, vents,
               {[terrain](std::span<const Vec3> x, Real reach, std::span<geometry::Contact> out) { terrain.contacts(x, reach, out); }},
               [terrain](const Vec3& p) { return terrain.height(p.x(), p.y()).has_value(); }, obstacles_->solids()),
@@ -195,7 +195,7 @@ class ModernLavaEffect final : public Effect {
     io.value("max_speed", self.last_.max_speed);
   }
 
-  std::unique_ptr<MovingObstacles> obstacles_;  // lava_ refers to it
+  std::unique_ptr<SolidWorld> obstacles_;  // lava_ refers to it
   ModernLava lava_;
   bool heat_;
   std::vector<Opening> openings_;

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "flow/sph/movable.h"
 #include "geometry/base/types.h"
 
 /// Solid ground in the sums of a particle: the kernel and its moments over the half-space beyond the
@@ -23,6 +24,8 @@ struct Wall {
   Real temperature = 0;            ///< [K]; 0: none of its own
   Real friction = 1;               ///< factor of the drag along it: FilmFriction
   bool mirrors = false;            ///< the pressure goes on along it beyond it, as in a mirror: pressure.h
+  Index movable = kNotMovable;     ///< place in ParticleSystem::movable; then `velocity` is not looked at
+  Vec3 arm = Vec3::Zero();         ///< from its centre to the wall's place [m]
   Real part = 1, share = 1;        ///< of its gamma and of its other values that are its own, where walls meet: trim_walls()
 };
 

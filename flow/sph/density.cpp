@@ -175,7 +175,7 @@ void shear_rate_squared(const ParticleSystem& s, Real slip_length, std::span<con
         const BoundaryTable::Row row = s.boundary->at(wall);
         const Real depth = std::max(wall.distance, kNearestWall * s.spacing) + slip_length;
         const Mat3 across = wall.normal * wall.normal.transpose();
-        gradient += row.moment_n / depth * (v[i] - wall.velocity) * wall.normal.transpose();
+        gradient += row.moment_n / depth * (v[i] - s.velocity_of(wall)) * wall.normal.transpose();
         moment += row.moment_n * across + row.moment_t * (Mat3::Identity() - across);
       }
       // The inverse, without the directions that the neighbours say nothing of.

@@ -113,7 +113,7 @@ struct ModernLava::Impl {
         film(table, o.spacing),
         frames(o.rest_period),
         ground({support, std::isfinite(o.ground_speed) ? kLook * support : support, kClearance * o.spacing, 8}, std::move(sources), std::move(inside)),
-        solids(solid_options, kClearance * o.spacing),
+        solids(solid_options, kClearance * o.spacing, mass),
         emitter(std::move(vents), o.spacing, o.seed, ground.sources()),
         heat(o.heat, o.spacing, o.density) {
     CHECK_GT(o.spacing, 0.0);
@@ -213,6 +213,8 @@ struct ModernLava::Impl {
     s.period = o.period;
     s.fixed = fixed;
     s.pairs = &pairs;
+    s.movable = solids.movable();
+    s.density = o.density;
     return s;
   }
 
@@ -337,7 +339,7 @@ struct ModernLava::Impl {
       if (!o.rheology.needs_strain_rate()) return;
       for (Index w = walls.first[k]; w < walls.first[k + 1]; ++w) {
         Wall& wall = walls.walls[w];
-        const Vec3 slip = lv[k] - wall.velocity;
+        const Vec3 slip = lv[k] - (wall.movable == kNotMovable ? wall.velocity : solids.movable()[wall.movable].velocity_at(wall.arm));
         const Real along = (slip - slip.dot(wall.normal) * wall.normal).norm();
         const Real steep = along / (std::max(wall.distance, kClearance * o.spacing) + o.slip_length);
         if (steep > shear) wall.friction *= (mu_k - o.rheology.viscosity(T[i], shear) + o.rheology.viscosity(T[i], (1 - kSteep) * shear + kSteep * steep)) / mu_k;
@@ -353,6 +355,7 @@ struct ModernLava::Impl {
     least.assign(m, 0.0);
     predicted.resize(m);
     lv = start;
+    solids.begin_try();
     parallel_for(m, [&](std::size_t k) {
       lq[k] = std::max(q[set.particles[k]], 0.0);
       rate[k] = k < set.awake ? std::max(1 - shape.density[k], 0.0) * kFillUp / dt : 0;  // a sleeper keeps its gaps
@@ -361,7 +364,9 @@ struct ModernLava::Impl {
     const Real g = o.gravity.norm(), scale = g > 0 ? dt * g : std::numeric_limits<Real>::infinity();
     const Real tight = std::min(1.0, kTight * dt * std::sqrt(g / o.spacing)) * o.divergence_tolerance;
     for (int round = 0; round < o.coupling; ++round) {
+      solids.restart(dt);
       pressure_acceleration(s, lq, predicted);
+      push_movables(s, lq, predicted, dt);
       parallel_for(m, [&](std::size_t k) { predicted[k] = s.is_fixed(k) ? start[k] : Vec3(start[k] + dt * (predicted[k] + o.gravity)); }, 2048);
       const ViscosityResult viscous = viscosity.solve(s, o.density, lmu, o.slip_length, dt, predicted, o.viscosity_tolerance, o.max_iterations, lv, scale);
       if (o.heat.on && o.heat.viscous_heating) viscous_v = lv;
@@ -571,6 +576,7 @@ struct ModernLava::Impl {
   void rest(Real dt, ModernReport& report) {
     acceleration = 0;
     if (o.ground_speed > 0) ground.moved(x, x, dt * o.ground_speed);
+    if (solids.any()) solids.go(time, dt);
     rested += dt;
     if (rested >= kNap * o.max_step || emitter.emits(time, time + dt)) catch_up(report);
     finish(dt, report);
@@ -590,12 +596,12 @@ struct ModernLava::Impl {
 
   /// Sleepers that a moving surface has come near to.
   void wake_by_walls(Real dt) {
-    const bool moving = solids.any() && solids.fastest() > 0;
+    const bool moving = solids.any() && solids.fastest() > o.sleep_speed;
     if ((o.ground_speed <= 0 && !moving) || std::find(asleep.begin(), asleep.end(), 1) == asleep.end()) return;
     if (moving) {
       const Real reach = support + dt * solids.fastest();
       parallel_for(size(), [&](std::size_t i) {
-        if (!asleep[i] || !solids.disturbs(x[i], reach)) return;
+        if (!asleep[i] || !solids.disturbs(x[i], reach, o.sleep_speed)) return;
         asleep[i] = 0;
         slow[i] = 0;
       });

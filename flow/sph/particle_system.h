@@ -24,10 +24,13 @@ struct ParticleSystem {
   Real spacing = 0;                        ///< [m]; volume V = spacing^3
   Vec2 period = Vec2::Zero();              ///< [m]; 0: not periodic
   std::span<const std::uint8_t> fixed;     ///< 1: its velocity is prescribed; empty: none
+  std::span<Movable> movable;              ///< bodies that walls belong to; the solves change their velocities
+  Real density = 0;                        ///< [kg/m^3]; needed beside movable bodies only
   PairKernels* pairs = nullptr;            ///< built on this system, shared by all who sum over it; null: each builds its own
 
   std::size_t size() const { return x.size(); }
   Real volume() const { return spacing * spacing * spacing; }
+  Vec3 velocity_of(const Wall& wall) const { return wall.movable == kNotMovable ? wall.velocity : movable[wall.movable].velocity_at(wall.arm); }
   bool is_fixed(std::size_t i) const { return !fixed.empty() && fixed[i]; }
   /// x_i - x_j, of the nearest image.
   template <bool kPeriodic>

@@ -68,16 +68,33 @@ Mat3 mirrored(const ParticleSystem& s, std::size_t i) {
   return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(kLeastOwn).cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose();
 }
 
+namespace {
+/// f(wall, weight) for the walls of particle i that mirror; weights add up to 1.
+template <class F>
+void for_each_mirror(const ParticleSystem& s, std::size_t i, F&& f) {
+  Real sum = 0;
+  for (const Wall& wall : (*s.walls)[i])
+    if (wall.mirrors) sum += s.boundary->at(wall).moment_t;
+  if (!(sum > 0)) return;
+  for (const Wall& wall : (*s.walls)[i])
+    if (wall.mirrors) f(wall, s.boundary->at(wall).moment_t / sum);
+}
+}  // namespace
+
 void compression_rate(const ParticleSystem& s, std::span<const Vec3> velocities, std::span<Real> out) {
   CHECK_EQ(velocities.size(), s.size());
   CHECK_EQ(out.size(), s.size());
   const PairsOf pairs(s);
   std::vector<Vec3> v(velocities.begin(), velocities.end());
-  parallel_for(s.size(), [&](std::size_t i) { v[i] = mirrored(s, i) * v[i]; }, 2048);
+  parallel_for(s.size(), [&](std::size_t i) {
+    Vec3 wall = Vec3::Zero();
+    for_each_mirror(s, i, [&](const Wall& w, Real weight) { wall += weight * s.velocity_of(w); });
+    v[i] += (mirrored(s, i) - Mat3::Identity()) * (v[i] - wall);
+  }, 2048);
   parallel_ranges(s.size(), kGrain, [&](std::size_t begin, std::size_t end) {
     pairs->divergence(begin, end, v, out);
     for (std::size_t i = begin; i < end; ++i)
-      for (const Wall& wall : (*s.walls)[i]) out[i] += 2 * s.boundary->at(wall).slope * wall.normal.dot(velocities[i] - wall.velocity);
+      for (const Wall& wall : (*s.walls)[i]) out[i] += 2 * s.boundary->at(wall).slope * wall.normal.dot(velocities[i] - s.velocity_of(wall));
   });
 }
 
@@ -93,6 +110,26 @@ void pressure_acceleration(const ParticleSystem& s, std::span<const Real> q, std
       out[i] = -sum;
     }
   });
+}
+
+void push_movables(const ParticleSystem& s, std::span<const Real> q, std::span<const Vec3> a, Real dt) {
+  if (s.movable.empty()) return;
+  CHECK_EQ(a.size(), s.size());
+  const Real mass = s.density * s.volume();
+  for (std::size_t i = 0; i < s.size(); ++i) {
+    if (s.is_fixed(i) || std::none_of((*s.walls)[i].begin(), (*s.walls)[i].end(), [](const Wall& wall) { return wall.movable != kNotMovable; })) continue;
+    Vec3 sum = a[i];
+    for (const Wall& wall : (*s.walls)[i]) {
+      const Vec3 push = 2 * q[i] * s.boundary->at(wall).slope * wall.normal;
+      sum += push;
+      if (wall.movable != kNotMovable) s.movable[wall.movable].push(dt * mass * push, wall.arm);
+    }
+    const Mat3 P = mirrored(s, i);
+    const Vec3 extra = sum - P.inverse() * sum;  // (P - 1) of what the pairs gave
+    for_each_mirror(s, i, [&](const Wall& wall, Real weight) {
+      if (wall.movable != kNotMovable) s.movable[wall.movable].push(-dt * mass * weight * extra, wall.arm);
+    });
+  }
 }
 
 void smooth_linear(const ParticleSystem& s, std::span<const Real> values, std::span<Real> out) {
@@ -137,7 +174,30 @@ void PressureSolver::prepare(const ParticleSystem& s) {
   pairs_.build(s);
   mirrored_.clear();
   for (std::size_t i = 0; i < n; ++i)
-    if (any_mirrors((*s.walls)[i])) mirrored_.push_back({static_cast<Index>(i), mirrored(s, i), Eigen::Vector3f::Zero()});
+    if (any_mirrors((*s.walls)[i])) {
+      Mirrored m{.particle = static_cast<Index>(i), .P = mirrored(s, i)};
+      for_each_mirror(s, i, [&](const Wall& wall, Real weight) {
+        if (wall.movable == kNotMovable) m.wall += weight * wall.velocity;
+      });
+      mirrored_.push_back(m);
+    }
+
+  grips_.clear();
+  answer_.resize(s.movable.size());
+  if (!s.movable.empty()) {
+    std::size_t m = 0;
+    for (Index i = 0; i < n; ++i) {
+      while (m < mirrored_.size() && mirrored_[m].particle < i) ++m;
+      const bool here = m < mirrored_.size() && mirrored_[m].particle == i;
+      Real sum = 0;
+      for (const Wall& wall : (*s.walls)[i]) sum += wall.mirrors ? s.boundary->at(wall).moment_t : 0;
+      for (Index k = s.walls->first[i]; k < s.walls->first[i + 1]; ++k) {
+        const Wall& wall = s.walls->walls[k];
+        if (wall.movable == kNotMovable || s.is_fixed(i)) continue;
+        grips_.push_back({i, k, here ? static_cast<Index>(m) : kNotMovable, here && wall.mirrors && sum > 0 ? s.boundary->at(wall).moment_t / sum : 0});
+      }
+    }
+  }
 
   // Diagonal of A, by which the unknowns are scaled: q = scale y. And what walls push, once.
   parallel_for(n, [&](std::size_t i) { pairs_.set(i, s.is_fixed(i) ? 0.0f : 1.0f); }, 4096);
@@ -149,6 +209,12 @@ void PressureSolver::prepare(const ParticleSystem& s) {
       for (Index k = s.walls->first[i]; k < s.walls->first[i + 1]; ++k) {
         push_[k] = 2 * s.boundary->at(s.walls->walls[k]).slope * s.walls->walls[k].normal;
         slope += push_[k];
+        if (s.walls->walls[k].movable != kNotMovable && !s.is_fixed(i)) {
+          const Wall& wall = s.walls->walls[k];
+          const Movable& body = s.movable[wall.movable];
+          const Vec3 turn = wall.arm.cross(push_[k]);
+          diagonal += s.density * s.volume() * (body.inverse_mass * push_[k].squaredNorm() + turn.dot(body.inverse_inertia * turn));
+        }
       }
       if (!s.is_fixed(i)) diagonal += slope.squaredNorm();
       scale_[i] = diagonal > 0 ? static_cast<float>(1 / std::sqrt(diagonal)) : 0;
@@ -158,7 +224,7 @@ void PressureSolver::prepare(const ParticleSystem& s) {
   for (const Mirrored& m : mirrored_) scale_[m.particle] /= static_cast<float>(m.P.trace() / 3);
 }
 
-/// a_ = -D^T of the packed q = scale p, 0 for fixed particles.
+/// a_ (and answer_) = -D^T of the packed q = scale p, 0 for fixed particles.
 void PressureSolver::accelerate(const ParticleSystem& s) {
   const Index* first = s.walls->first.data();
   FloatPairs::Vector* a = a_.data();
@@ -167,7 +233,9 @@ void PressureSolver::accelerate(const ParticleSystem& s) {
     for (std::size_t i = begin; i < end; ++i) a[i] = {-a[i].x, -a[i].y, -a[i].z, 0};
     for (auto m = std::lower_bound(mirrored_.begin(), mirrored_.end(), begin, [](const Mirrored& one, std::size_t i) { return one.particle < i; });
          m != mirrored_.end() && m->particle < end; ++m) {
-      const Eigen::Vector3f turned = m->P.cast<float>() * Eigen::Vector3f(a[m->particle].x, a[m->particle].y, a[m->particle].z);
+      const Vec3 own(a[m->particle].x, a[m->particle].y, a[m->particle].z);
+      m->extra = m->P * own - own;
+      const Eigen::Vector3f turned = (own + m->extra).cast<float>();
       a[m->particle] = {turned.x(), turned.y(), turned.z(), 0};
     }
     for (Index k = first[begin], i = static_cast<Index>(begin); k < first[end]; ++k) {
@@ -179,6 +247,26 @@ void PressureSolver::accelerate(const ParticleSystem& s) {
     for (std::size_t i = begin; i < end; ++i)
       if (s.fixed[i]) a[i] = {};
   });
+  answer([&](const Grip& grip) { return static_cast<Real>(scale_[grip.particle] * p_[grip.particle]); }, s);
+}
+
+/// answer_: accelerations of bodies to the pressures of(grip).
+template <class F>
+void PressureSolver::answer(F&& of, const ParticleSystem& s) {
+  if (answer_.empty()) return;
+  const Real mass = s.density * s.volume();
+  std::fill(answer_.begin(), answer_.end(), Answer{});
+  for (const Grip& grip : grips_) {
+    const Wall& wall = s.walls->walls[grip.wall];
+    Vec3 force = mass * of(grip) * push_[grip.wall];
+    if (grip.mirrored != kNotMovable) force -= mass * grip.weight * mirrored_[grip.mirrored].extra;
+    answer_[wall.movable].linear += force;
+    answer_[wall.movable].angular += wall.arm.cross(force);
+  }
+  for (std::size_t b = 0; b < answer_.size(); ++b) {
+    answer_[b].linear *= s.movable[b].inverse_mass;
+    answer_[b].angular = s.movable[b].inverse_inertia * answer_[b].angular;
+  }
 }
 
 /// Ap = scale A scale p, with scale p packed; returns p . Ap and p . g.
@@ -187,7 +275,17 @@ PressureSolver::Sums PressureSolver::multiply(const ParticleSystem& s) {
   for (Mirrored& m : mirrored_) {
     FloatPairs::Vector& a = a_[m.particle];
     m.kept = {a.x, a.y, a.z};
-    const Eigen::Vector3f turned = m.P.cast<float>() * m.kept;
+    m.body.setZero();
+  }
+  for (const Grip& grip : grips_)
+    if (grip.mirrored != kNotMovable) {
+      const Wall& wall = s.walls->walls[grip.wall];
+      mirrored_[grip.mirrored].body += grip.weight * (answer_[wall.movable].linear + answer_[wall.movable].angular.cross(wall.arm));
+    }
+  for (Mirrored& m : mirrored_) {
+    FloatPairs::Vector& a = a_[m.particle];
+    const Vec3 own = m.kept.cast<Real>();
+    const Eigen::Vector3f turned = (own + (m.P - Mat3::Identity()) * (own - m.body)).cast<float>();
     a = {turned.x(), turned.y(), turned.z(), 0};
   }
   const Index* first = s.walls->first.data();
@@ -200,7 +298,11 @@ PressureSolver::Sums PressureSolver::multiply(const ParticleSystem& s) {
       while (k >= first[i + 1]) ++i;
       while (m != mirrored_.end() && m->particle < i) ++m;
       const Eigen::Vector3f push = push_[k].cast<float>();
-      const Eigen::Vector3f a = m != mirrored_.end() && m->particle == i ? m->kept : Eigen::Vector3f(a_[i].x, a_[i].y, a_[i].z);
+      Eigen::Vector3f a = m != mirrored_.end() && m->particle == i ? m->kept : Eigen::Vector3f(a_[i].x, a_[i].y, a_[i].z);
+      if (!answer_.empty() && s.walls->walls[k].movable != kNotMovable) {
+        const Wall& wall = s.walls->walls[k];
+        a -= (answer_[wall.movable].linear + answer_[wall.movable].angular.cross(wall.arm)).cast<float>();
+      }
       Ap[i] += push.x() * a.x() + push.y() * a.y() + push.z() * a.z();
     }
     for (std::size_t i = begin; i < end; ++i) Ap[i] *= -scale[i];
@@ -331,7 +433,10 @@ PressureResult PressureSolver::solve_prepared(const ParticleSystem& s, std::span
     std::span<const Vec3> flow = v;
     if (!mirrored_.empty()) {
       flow_.assign(v.begin(), v.end());
-      for (const Mirrored& m : mirrored_) flow_[m.particle] = m.P * v[m.particle];
+      for (Mirrored& m : mirrored_) m.body = m.wall;
+      for (const Grip& grip : grips_)
+        if (grip.mirrored != kNotMovable) mirrored_[grip.mirrored].body += grip.weight * s.velocity_of(s.walls->walls[grip.wall]);
+      for (const Mirrored& m : mirrored_) flow_[m.particle] += (m.P - Mat3::Identity()) * (v[m.particle] - m.body);
       flow = flow_;
     }
     // Of half y A y - b y the gradient at the pressures that have acted is (rate - D v) / dt.
@@ -341,7 +446,7 @@ PressureResult PressureSolver::solve_prepared(const ParticleSystem& s, std::span
       Sums sum;
       for (std::size_t i = begin; i < end; ++i) {
         Real rate_i = compression[i - begin];
-        for (Index k = s.walls->first[i]; k < s.walls->first[i + 1]; ++k) rate_i += push_[k].dot(v[i] - s.walls->walls[k].velocity);
+        for (Index k = s.walls->first[i]; k < s.walls->first[i + 1]; ++k) rate_i += push_[k].dot(v[i] - s.velocity_of(s.walls->walls[k]));
         y_[i] = 0;
         g_[i] = scale_[i] * static_cast<float>((rate[i] - rate_i) / dt);
         low_[i] = scale_[i] > 0 ? static_cast<float>((least[i] - q[i]) / scale_[i]) : 0;
@@ -384,11 +489,22 @@ PressureResult PressureSolver::solve_prepared(const ParticleSystem& s, std::span
       for (std::size_t i = begin; i < end; ++i) {
         if (s.is_fixed(i)) continue;
         while (m != mirrored_.end() && m->particle < i) ++m;
-        Vec3 sum = m != mirrored_.end() && m->particle == i ? Vec3(m->P * gradient[i - begin]) : gradient[i - begin];
+        Vec3 sum = gradient[i - begin];
+        if (m != mirrored_.end() && m->particle == i) {
+          m->extra = sum - m->P * sum;
+          sum -= m->extra;
+        }
         for (Index k = s.walls->first[i]; k < s.walls->first[i + 1]; ++k) sum += change_[i] * push_[k];
         v[i] -= dt * sum;
       }
     });
+    if (!answer_.empty()) {
+      answer([&](const Grip& grip) { return change_[grip.particle]; }, s);
+      for (std::size_t b = 0; b < answer_.size(); ++b) {
+        s.movable[b].velocity += dt * answer_[b].linear;
+        s.movable[b].spin += dt * answer_[b].angular;
+      }
+    }
     if (stuck || result.iterations >= max_iterations) break;
     if (result.converged && kFloatNoise * std::sqrt(moved.first) <= kTrust * tolerance * std::sqrt(count)) break;
   }

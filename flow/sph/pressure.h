@@ -18,12 +18,12 @@ namespace effuse::flow::sph {
 void compression_rate(const ParticleSystem& system, std::span<const Vec3> v, std::span<Real> out);
 
 /// Walls that mirror (Wall::mirrors) have their mirror image counted in full: what flows along them counts for the lava's half of the
-/// kernel and for the image's. Beside them v stands for P v above, and below the sum over j is multiplied by P,
+/// kernel and for the image's. Beside them v stands for v + (P - 1)(v - v_wall) above, and below the sum over j is multiplied by P,
 ///
 ///   P = (1 - sum_walls moment_t (1 - n n^T))^-1
 ///
-/// one over the share of the kernel that the lava has; D and D^T stay transposes of each other. Without it lava at rest
-/// creeps down upright walls, by 0.1 g spacing^2 / nu.
+/// one over the share of the kernel that the lava has, v_wall the mean of the walls' weighted by moment_t; what P adds pushes the wall
+/// back. D and D^T stay transposes of each other. Without it lava at rest creeps down upright walls, by 0.1 g spacing^2 / nu.
 Mat3 mirrored(const ParticleSystem& system, std::size_t i);
 
 /// Acceleration [m/s^2] by the kinematic pressures q = p / rho [m^2/s^2]:
@@ -32,6 +32,10 @@ Mat3 mirrored(const ParticleSystem& system, std::size_t i);
 ///
 /// the transpose of D: pressure does the work that compression takes up, momentum is kept to rounding.
 void pressure_acceleration(const ParticleSystem& system, std::span<const Real> q, std::span<Vec3> out);
+
+/// What the pressures q push bodies (ParticleSystem::movable) in a time dt: on each the opposite of what its walls push the particles.
+///   a  pressure_acceleration() of q
+void push_movables(const ParticleSystem& system, std::span<const Real> q, std::span<const Vec3> a, Real dt);
 
 /// A field through particles' values without their scatter: at each particle the value of the linear function that fits its
 /// neighbours and itself best, weighted by the kernel (moving least squares; linear fields come out unchanged). The
@@ -52,6 +56,8 @@ struct PressureResult {
 /// below: a symmetric, positive semidefinite problem, solved by modified proportioning with reduced gradient projections
 /// (MPRGP: conjugate gradients on the particles off their bound). v must have been accelerated by q_old already.
 /// With rate = 0 the velocities are free of divergence; a negative rate takes density back that is too large.
+/// Bodies that lava moves (ParticleSystem::movable) give way to the pressures in the same solve, as their mass and inertia allow (to
+/// A comes the positive part that their walls share): light ones float on it as heavy ones press on it.
 /// The same operators as DFSPH (Bender & Koschier 2015), conjugate gradients in place of Jacobi's iteration.
 ///
 /// The iterations run in single precision, on the change of q; what they find acts on v and q in double, and where it matters
@@ -88,15 +94,28 @@ class PressureSolver {
       return *this;
     }
   };
+  struct Grip {  // a wall of a body
+    Index particle, wall;
+    Index mirrored;  // place in mirrored_, or kNotMovable
+    Real weight;     // of this wall among those that mirror
+  };
+  struct Answer {  // of a body: accelerations
+    Vec3 linear = Vec3::Zero(), angular = Vec3::Zero();
+  };
   /// A particle beside a wall that mirrors.
   struct Mirrored {
     Index particle;
     Mat3 P;
-    Eigen::Vector3f kept;  // its acceleration, while a_ holds P a
+    Vec3 wall = Vec3::Zero();   // weighted velocity of walls that are no body's
+    Vec3 body = Vec3::Zero();   // the same of bodies, or of their accelerations
+    Vec3 extra = Vec3::Zero();  // acceleration that P adds
+    Eigen::Vector3f kept = Eigen::Vector3f::Zero();  // its acceleration, while a_ holds what flows
   };
   template <class F>
   Sums sum_of(F&& f);
   void accelerate(const ParticleSystem& s);
+  template <class F>
+  void answer(F&& of, const ParticleSystem& s);
   Sums multiply(const ParticleSystem& s);
   Sums iterate(const ParticleSystem& s, Real dt, Real goal, int max_iterations, int& iterations);
 
@@ -106,6 +125,8 @@ class PressureSolver {
   std::vector<FloatPairs::Vector> a_;
   std::vector<Vec3> push_;  // of each wall
   std::vector<Mirrored> mirrored_;  // rising
+  std::vector<Grip> grips_;
+  std::vector<Answer> answer_;      // of bodies to a_
   std::vector<Vec3> flow_;          // P v, where some are
   std::vector<Real> change_;
   std::vector<Sums> partial_;

@@ -19,34 +19,43 @@ Box3 widened(Box3 box, Real by) {
 }
 }  // namespace
 
-Solids::Solids(const SolidOptions& options, Real radius) : options_(options), radius_(radius) {
+Solids::Solids(const SolidOptions& options, Real radius, Real mass) : options_(options), radius_(radius), mass_(mass) {
   CHECK_GT(radius, 0.0);
   for (const Real f : options.friction) CHECK(f >= 0 && f <= 1);
 }
 
+void Solids::restart(Real dt) {
+  movable_ = before_;
+  for (Movable& body : movable_) body.velocity += dt * body.acceleration;
+}
+
 void Solids::go(Real time, Real dt) {
+  if (!movable_.empty() && options_.moved) options_.moved(movable_, dt);
   if (options_.move) options_.move(time, time + dt);
 }
 
 void Solids::stand(Real time, Real dt) {
   fastest_ = 0;
+  before_.clear();
+  if (options_.movable) options_.movable(before_);
+  movable_ = before_;
   if (!options_.move) return;
-  options_.move(time, time + dt);
-  // Contacts are where motions end: moved back by the step, with the same speed.
   geometry::Obstacles& all = *options_.obstacles;
+  if (options_.stand) {
+    options_.stand(time, dt);
+  } else {
+    options_.move(time, time + dt);
+    for (std::size_t i = 0; i < all.size(); ++i) all.move(i, all[i].motion.turned_back());
+    all.update();
+  }
   for (std::size_t i = 0; i < all.size(); ++i) {
-    const geometry::RigidMotion motion = all[i].motion;
+    const geometry::RigidMotion& motion = all[i].motion;
     if (!motion.moves() || motion.duration() == 0) continue;
     // Around the frame's origin no point of the shape is farther out than its box's corners.
     const Box3& box = all[i].shape.bounds();
     const Real radius = box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs()).norm();
     fastest_ = std::max(fastest_, (motion.shift().norm() + motion.turn().norm() * radius) / motion.duration());
-    geometry::RigidPose before = motion.from();
-    before.position -= motion.shift();
-    before.orientation = (motion.to().orientation * motion.from().orientation.conjugate()).conjugate() * before.orientation;
-    all.move(i, geometry::RigidMotion(before, motion.from(), motion.duration()));
   }
-  all.update();
 }
 
 void Solids::rest() {
@@ -91,8 +100,12 @@ void Solids::add_walls(std::span<const Vec3> x, Real reach, Walls& walls) {
     for (Index c = 0; c < count_[k]; ++c) {
       const Contact& contact = contacts_[q * kMost + c];
       const Real friction = contact.surface < options_.friction.size() ? options_.friction[contact.surface] : 1;
+      const auto body = std::find_if(movable_.begin(), movable_.end(), [&](const Movable& m) { return m.surface == contact.surface; });
+      const bool moves = body != movable_.end();
       merged_.walls[place++] = {.normal = contact.normal, .distance = contact.distance, .reach = contact.distance, .surface = contact.surface,
-                                .velocity = contact.surface_velocity, .temperature = contact.surface_temperature, .friction = friction, .mirrors = true};
+                                .velocity = contact.surface_velocity, .temperature = contact.surface_temperature, .friction = friction,
+                                .mirrors = true, .movable = moves ? static_cast<Index>(body - movable_.begin()) : kNotMovable,
+                                .arm = moves ? Vec3(contact.point - body->centre) : Vec3::Zero()};
       speed_ = std::max(speed_, contact.surface_velocity.norm());
     }
     ++q;
@@ -102,11 +115,11 @@ void Solids::add_walls(std::span<const Vec3> x, Real reach, Walls& walls) {
   std::swap(walls.walls, merged_.walls);
 }
 
-bool Solids::disturbs(const Vec3& x, Real reach) const {
+bool Solids::disturbs(const Vec3& x, Real reach, Real speed) const {
   if (!any() || !widened(options_.obstacles->bounds(), reach).contains(x)) return false;
   std::array<Contact, kMost> found;
   const int n = options_.obstacles->contacts(x, reach, found);
-  return std::any_of(found.begin(), found.begin() + n, [](const Contact& c) { return !c.surface_velocity.isZero(); });
+  return std::any_of(found.begin(), found.begin() + n, [&](const Contact& c) { return c.surface_velocity.norm() > speed; });
 }
 
 geometry::SlideReport Solids::slide(std::span<const Index> which, std::span<const Vec3> before, std::span<Vec3> x, std::span<Vec3> v) {
@@ -124,8 +137,10 @@ geometry::SlideReport Solids::slide(std::span<const Index> which, std::span<cons
     way_[q] = x[near_[q]] - at_[q];
     speed_at_[q] = v[near_[q]];
   }
-  const geometry::SlideReport report = geometry::slide_all(*options_.obstacles, at_, way_, speed_at_, std::span(&radius_, 1));
+  met_.assign(n, 0);
+  const geometry::SlideReport report = geometry::slide_all(*options_.obstacles, at_, way_, speed_at_, std::span(&radius_, 1), {}, met_);
   for (std::size_t q = 0; q < n; ++q) {
+    if (met_[q] != 0 && options_.push && speed_at_[q] != v[near_[q]]) options_.push(met_[q], mass_ * (v[near_[q]] - speed_at_[q]), at_[q]);
     x[near_[q]] = at_[q];
     v[near_[q]] = speed_at_[q];
   }

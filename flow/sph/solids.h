@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "flow/sph/boundary.h"
+#include "flow/sph/movable.h"
 #include "geometry/collide/obstacles.h"
 #include "geometry/collide/slide.h"
 
@@ -15,11 +16,21 @@ namespace effuse::flow::sph {
 ///
 ///   obstacles  not owned; must outlive the lava and stand still while it steps. Surfaces' numbers are from 1 on
 ///   move       sets the obstacles' motions to their way from one moment to another and calls update(); empty: nothing moves
+///   stand      sets motions that end where obstacles are at a moment, at the speed they have in the step of dt [s] that follows, and calls
+///              update(); empty: what move() says for that step is turned back
 ///   friction   by surface number: factor of the drag along it, 1 no slip, 0 free slip; shorter lists: 1
+///   movable    the bodies among them that lava moves, as they are now, in any order; called at a step's begin; empty: there are none
+///   moved      those bodies with the velocities that lava has given them in a step of dt [s], acceleration * dt included. What lava has
+///              done is the difference less that. Called before move() for the step
+///   push       an impulse [N s] that particles stopped by a body's surface have given it, at a place [m], after the step
 struct SolidOptions {
   geometry::Obstacles* obstacles = nullptr;
   std::function<void(Real from, Real to)> move;
   std::vector<Real> friction;
+  std::function<void(Real time, Real dt)> stand = {};
+  std::function<void(std::vector<Movable>&)> movable = {};
+  std::function<void(std::span<const Movable>, Real dt)> moved = {};
+  std::function<void(Index surface, const Vec3& impulse, const Vec3& at)> push = {};
 };
 
 /// The lava's side of its obstacles: walls for the sums, and moves that go through nothing.
@@ -30,14 +41,19 @@ struct SolidOptions {
 /// Known limit: at the inner edges of a vessel the sums still miss a little; lava at rest in it creeps round by 0.08 g spacing^2 / nu.
 class Solids {
  public:
-  /// radius: particles' centres stay so far off surfaces where there is room [m].
-  Solids(const SolidOptions& options, Real radius);
+  /// radius: particles' centres stay so far off surfaces where there is room [m]. mass: of a particle [kg].
+  Solids(const SolidOptions& options, Real radius, Real mass);
 
   bool any() const { return options_.obstacles != nullptr && !options_.obstacles->empty(); }
 
   /// Obstacles stand where they are at `time` and have the velocities of their way to time + dt.
   void stand(Real time, Real dt);
-  /// Obstacles go from time to time + dt.
+  /// Bodies: as the solves have them; back to the step's begin; and that, with what else moves them in a time dt.
+  std::span<Movable> movable() { return movable_; }
+  void begin_try() { movable_ = before_; }
+  void restart(Real dt);
+
+  /// Obstacles go from time to time + dt; bodies with the velocities they have been given.
   void go(Real time, Real dt);
 
   /// Obstacles stand where their way has ended.
@@ -49,8 +65,8 @@ class Solids {
   void add_walls(std::span<const Vec3> x, Real reach, Walls& walls);
   /// The fastest surface among the walls last added [m/s].
   Real speed() const { return speed_; }
-  /// Whether a moving surface is within reach of x.
-  bool disturbs(const Vec3& x, Real reach) const;
+  /// Whether a surface that goes faster than `speed` [m/s] is within reach of x.
+  bool disturbs(const Vec3& x, Real reach, Real speed) const;
 
   /// Particles `which` that would go from `before` to `x` (by particle, all of them), velocities v: stopped, carried, led along by the
   /// obstacles on their way; x and v changed. Obstacles must be going (go()).
@@ -61,9 +77,10 @@ class Solids {
   static constexpr int kMost = 4;  // surfaces that a particle feels at a time
 
   SolidOptions options_;
-  Real radius_;
+  Real radius_, mass_;
   Real speed_ = 0, fastest_ = 0;
-  std::vector<Index> near_;
+  std::vector<Movable> movable_, before_;
+  std::vector<Index> near_, met_;
   std::vector<Vec3> at_, way_, speed_at_;
   std::vector<geometry::Contact> contacts_;
   std::vector<Index> count_;

@@ -31,7 +31,7 @@ Vec3 walls_drag(const ParticleSystem& s, Real mu, Real slip_length, const Vec3& 
   Vec3 sum = Vec3::Zero();
   for (const Wall& wall : (*s.walls)[i]) {
     const WallDrag drag = wall_drag(*s.boundary, wall, slip_length, s.spacing);
-    const Vec3 dv = v - wall.velocity;
+    const Vec3 dv = v - s.velocity_of(wall);
     const Vec3 across = dv.dot(wall.normal) * wall.normal;
     sum += mu * (drag.along * (dv - across) + drag.across * across);
   }
@@ -44,7 +44,7 @@ Real wall_dissipation(const ParticleSystem& s, Real mu, Real slip_length, const 
   Real sum = 0;
   for (const Wall& wall : (*s.walls)[i]) {
     const WallDrag drag = wall_drag(*s.boundary, wall, slip_length, s.spacing);
-    const Vec3 dv = v - wall.velocity;
+    const Vec3 dv = v - s.velocity_of(wall);
     const Real across = dv.dot(wall.normal);
     sum += mu * (drag.along * (dv.squaredNorm() - across * across) + drag.across * across * across);
   }
@@ -62,6 +62,15 @@ void viscous_acceleration(const ParticleSystem& s, Real density, std::span<const
     for (std::size_t i = begin; i < end; ++i) out[i] = -(out[i] + walls_drag(s, mu[i], slip_length, v[i], i)) / density;
   });
 }
+
+namespace {
+/// cross_matrix(a) b = a x b.
+Mat3 cross_matrix(const Vec3& a) {
+  Mat3 m;
+  m << 0, -a.z(), a.y(), a.z(), 0, -a.x(), -a.y(), a.x(), 0;
+  return m;
+}
+}  // namespace
 
 ViscositySolver::Factor::Factor(const Mat3& m) {
   // m = L L^T, inverted on the way: L^-1 = [a 0 0; b c 0; d e f].
@@ -99,6 +108,34 @@ ViscosityResult ViscositySolver::solve(const ParticleSystem& s, Real density, st
   const Real factor = dt / density;
   ViscosityResult result;
 
+  // Bodies: six velocities each, after the particles'. Their rows, divided by a particle's mass:
+  //   B V + sum_walls J^T D (J V - v_i) = B V0,   B their mass and inertia, J V the velocity of a wall's place.
+  const std::size_t bodies = s.movable.size();
+  const Real per_mass = bodies > 0 ? 1 / (s.density * s.volume()) : 0;
+  body_.resize(bodies);
+  for (std::size_t b = 0; b < bodies; ++b) {
+    const Movable& m = s.movable[b];
+    Body& body = body_[b];
+    body.matrix.setZero();
+    body.matrix.topLeftCorner<3, 3>() = per_mass / m.inverse_mass * Mat3::Identity();
+    body.matrix.bottomRightCorner<3, 3>() = per_mass * m.inverse_inertia.inverse();
+    body.v << m.velocity, m.spin;
+    body.r = body.matrix * body.v;
+    body.block = body.matrix;
+  }
+  grips_.clear();
+  for (Index i = 0; i < n && bodies > 0; ++i)
+    for (Index k = s.walls->first[i]; k < s.walls->first[i + 1]; ++k)
+      if (s.walls->walls[k].movable != kNotMovable) grips_.push_back({i, k});
+  // f(matrix of the wall's drag, its arm, body, particle) for all walls of bodies.
+  const auto for_each_grip = [&](auto&& f) {
+    for (const Grip& grip : grips_) {
+      const Wall& wall = s.walls->walls[grip.wall];
+      const Mat3 across = wall.normal * wall.normal.transpose();
+      f(Mat3(drag_[grip.wall].along * (Mat3::Identity() - across) + drag_[grip.wall].across * across), wall.arm, body_[wall.movable], grip.particle);
+    }
+  };
+
   // f(begin, end) returns a range's share of two sums.
   partial_.resize((n + kGrain - 1) / kGrain);
   const auto sum_of = [&](auto&& f) {
@@ -124,7 +161,7 @@ ViscosityResult ViscositySolver::solve(const ParticleSystem& s, Real density, st
         const Mat3 across = wall.normal * wall.normal.transpose();
         const Mat3 matrix = drag_[k].along * (Mat3::Identity() - across) + drag_[k].across * across;
         m += matrix;
-        b += matrix * wall.velocity;
+        if (wall.movable == kNotMovable) b += matrix * wall.velocity;
       }
       inverse_[i] = Factor(m);
       r_[i] = b;
@@ -133,9 +170,30 @@ ViscosityResult ViscositySolver::solve(const ParticleSystem& s, Real density, st
     return sum;
   });
 
-  // out = A in; returns in . out.
-  const auto multiply = [&](std::span<const Vec3> in, std::span<Vec3> out) {
-    return sum_of([&](std::size_t begin, std::size_t end) {
+  for_each_grip([&](const Mat3& D, const Vec3& arm, Body& body, Index) {
+    const Mat3 turn = cross_matrix(arm);  // J = [1, -turn]
+    body.block.topLeftCorner<3, 3>() += D;
+    body.block.topRightCorner<3, 3>() -= D * turn;
+    body.block.bottomLeftCorner<3, 3>() += turn * D;
+    body.block.bottomRightCorner<3, 3>() -= turn * D * turn;
+  });
+  for (Body& body : body_) {
+    body.inverse = body.block.inverse();
+    b2 += {body.r.dot(body.inverse * body.r), body.r.head<3>().squaredNorm()};
+  }
+
+  // out = A in; returns in . out. Of bodies: from Body::*from to Body::Ap.
+  const auto multiply = [&](std::span<const Vec3> in, std::span<Vec3> out, Vec6 Body::*from) {
+    Sums of_bodies;
+    for (Body& body : body_) body.Ap = body.matrix * (body.*from);
+    for_each_grip([&](const Mat3& D, const Vec3& arm, Body& body, Index i) {
+      const Vec6& V = body.*from;
+      const Vec3 pull = D * (V.head<3>() + V.tail<3>().cross(arm) - in[i]);
+      body.Ap.head<3>() += pull;
+      body.Ap.tail<3>() += arm.cross(pull);
+    });
+    for (const Body& body : body_) of_bodies.preconditioned += (body.*from).dot(body.Ap);
+    Sums all = sum_of([&](std::size_t begin, std::size_t end) {
       pairs->viscous(begin, end, in, out);
       Sums sum;
       for (std::size_t i = begin; i < end; ++i) {
@@ -145,18 +203,24 @@ ViscosityResult ViscositySolver::solve(const ParticleSystem& s, Real density, st
         }
         Vec3 a = in[i] + factor * out[i];
         for (Index k = s.walls->first[i]; k < s.walls->first[i + 1]; ++k) {
-          const Vec3& normal = s.walls->walls[k].normal;
-          const Vec3 across = in[i].dot(normal) * normal;
-          a += drag_[k].along * (in[i] - across) + drag_[k].across * across;
+          const Wall& wall = s.walls->walls[k];
+          Vec3 slip = in[i];
+          if (wall.movable != kNotMovable) {
+            const Vec6& V = body_[wall.movable].*from;
+            slip -= V.head<3>() + V.tail<3>().cross(wall.arm);
+          }
+          const Vec3 across = slip.dot(wall.normal) * wall.normal;
+          a += drag_[k].along * (slip - across) + drag_[k].across * across;
         }
         out[i] = a;
         sum += {in[i].dot(a), 0};
       }
       return sum;
     });
+    return all += of_bodies;
   };
 
-  multiply(v, Ap_);
+  multiply(v, Ap_, &Body::v);
   Sums rr = sum_of([&](std::size_t begin, std::size_t end) {
     Sums sum;
     for (std::size_t i = begin; i < end; ++i) {
@@ -166,6 +230,11 @@ ViscosityResult ViscositySolver::solve(const ParticleSystem& s, Real density, st
     }
     return sum;
   });
+  for (Body& body : body_) {
+    body.r -= body.Ap;
+    body.p = body.inverse * body.r;
+    rr += {body.r.dot(body.p), body.r.head<3>().squaredNorm()};
+  }
   // Where fixed particles alone drive the others, they are in the first residual only.
   if (b2.plain == 0) b2 = rr;
   const Real most = scale * scale * static_cast<Real>(n);
@@ -173,10 +242,10 @@ ViscosityResult ViscositySolver::solve(const ParticleSystem& s, Real density, st
   const Real goal = tolerance * tolerance;
   const auto reached = [&] { return rr.preconditioned <= goal * b2.preconditioned && rr.plain <= goal * b2.plain; };
   while (!reached() && result.iterations < max_iterations) {
-    const Real pAp = multiply(p_, Ap_).preconditioned;
+    const Real pAp = multiply(p_, Ap_, &Body::p).preconditioned;
     if (!(pAp > 0)) break;  // not a number, or rounding has the last word
     const Real alpha = rr.preconditioned / pAp;
-    const Sums next = sum_of([&](std::size_t begin, std::size_t end) {
+    Sums next = sum_of([&](std::size_t begin, std::size_t end) {
       Sums sum;
       for (std::size_t i = begin; i < end; ++i) {
         v[i] += alpha * p_[i];
@@ -186,10 +255,20 @@ ViscosityResult ViscositySolver::solve(const ParticleSystem& s, Real density, st
       }
       return sum;
     });
+    for (Body& body : body_) {
+      body.v += alpha * body.p;
+      body.r -= alpha * body.Ap;
+      next += {body.r.dot(body.inverse * body.r), body.r.head<3>().squaredNorm()};
+    }
     const Real beta = next.preconditioned / rr.preconditioned;
     rr = next;
     parallel_for(n, [&](std::size_t i) { p_[i] = Ap_[i] + beta * p_[i]; }, 2048);
+    for (Body& body : body_) body.p = body.inverse * body.r + beta * body.p;
     ++result.iterations;
+  }
+  for (std::size_t b = 0; b < bodies; ++b) {
+    s.movable[b].velocity = body_[b].v.head<3>();
+    s.movable[b].spin = body_[b].v.tail<3>();
   }
   result.residual = b2.plain > 0 ? std::sqrt(std::max(rr.preconditioned / b2.preconditioned, rr.plain / b2.plain)) : 0;
   result.converged = reached();

@@ -33,6 +33,9 @@ struct ViscosityResult {
   bool converged = false;
 };
 
+/// Bodies that lava moves (ParticleSystem::movable) are solved for together with it: their velocities at the step's end drag, and are
+/// dragged by, the particles beside them, so that any stiffness and lightness does.
+///
 /// Solves  v - dt a(v) = v0  for the velocities at the step's end by conjugate gradients, matrix-free, with the
 /// inverse 3x3 diagonal blocks as preconditioner. Unconditionally stable.
 class ViscositySolver {
@@ -65,6 +68,17 @@ class ViscositySolver {
       return *this;
     }
   };
+  using Vec6 = Eigen::Matrix<Real, 6, 1>;
+  using Mat6 = Eigen::Matrix<Real, 6, 6>;
+  struct Body {
+    Mat6 matrix, block, inverse;  // B; with the drag of its walls; the inverse of that
+    Vec6 v, r, p, Ap;             // velocity and spin; as the particles' arrays
+  };
+  struct Grip {
+    Index particle, wall;
+  };
+  std::vector<Body> body_;
+  std::vector<Grip> grips_;  // walls of bodies
   std::vector<Vec3> r_, p_, Ap_;
   std::vector<Factor> inverse_;
   std::vector<Drag> drag_;

@@ -45,6 +45,14 @@ RigidPose RigidMotion::pose(Real s) const {
   return {from_.position + s * shift_, turned(from_.orientation, s * turn_)};
 }
 
+RigidMotion RigidMotion::turned_back() const {
+  if (!moves() || duration_ == 0) return RigidMotion(from_);
+  RigidPose before = from_;
+  before.position -= shift_;
+  before.orientation = turned(from_.orientation, -turn_);
+  return RigidMotion(before, from_, duration_);
+}
+
 Vec3 RigidMotion::velocity_at(const Vec3& world, Real s) const {
   if (duration_ == 0) return Vec3::Zero();
   return (shift_ + turn_.cross(world - (from_.position + s * shift_))) / duration_;

@@ -41,6 +41,9 @@ class RigidMotion {
   /// Of the body's point that is at `world` at s [m/s]; zero when the duration is.
   Vec3 velocity_at(const Vec3& world, Real s) const;
 
+  /// The same velocities on a way that ends where this one begins.
+  RigidMotion turned_back() const;
+
   /// Contains every place that a point of `box` (in the body's frame) visits. Empty for an empty box.
   Box3 swept_box(const Box3& box) const;
 

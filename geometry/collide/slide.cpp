@@ -325,7 +325,10 @@ Slid Sliding::go(const Vec3& x, const Vec3& dx, const Vec3& v) {
     // What the surfaces do at the end is what it does with them.
     find_touches();
     bounced_ = false;
-    if (!scratch_.touches.empty()) respond();
+    if (!scratch_.touches.empty()) {
+      respond();
+      if (out_.surface == 0 && out_.v != v) out_.surface = at(scratch_.touches.front().obstacle).surface;
+    }
   }
   return out_;
 }
@@ -368,8 +371,9 @@ Slid slide(const Obstacles& obstacles, const Vec3& x, const Vec3& dx, const Vec3
 }
 
 SlideReport slide_all(const Obstacles& obstacles, std::span<Vec3> x, std::span<const Vec3> dx, std::span<Vec3> v, std::span<const Real> r,
-                      const SlideOptions& options) {
+                      const SlideOptions& options, std::span<Index> surfaces) {
   ZONE("collide.slide");
+  CHECK(surfaces.empty() || surfaces.size() == x.size());
   check_options(obstacles, options);
   CHECK_EQ(dx.size(), x.size());
   CHECK_EQ(v.size(), x.size());
@@ -380,6 +384,7 @@ SlideReport slide_all(const Obstacles& obstacles, std::span<Vec3> x, std::span<c
     Scratch scratch;
     SlideReport& report = part[begin / kGrain];
     for (std::size_t i = begin; i < end; ++i) {
+      if (!surfaces.empty()) surfaces[i] = 0;
       const Real radius = r[r.size() == 1 ? 0 : i];
       DCHECK(radius > 0);
       if (!meets_any(obstacles.impl(), swept_ball(x[i], dx[i], radius))) {
@@ -387,6 +392,7 @@ SlideReport slide_all(const Obstacles& obstacles, std::span<Vec3> x, std::span<c
         continue;
       }
       const Slid slid = slide_one(obstacles, x[i], dx[i], v[i], radius, options, scratch);
+      if (!surfaces.empty()) surfaces[i] = slid.v != v[i] ? slid.surface : 0;
       x[i] = slid.x;
       v[i] = slid.v;
       ++report.near;

@@ -20,7 +20,7 @@ struct SlideOptions {
 
 /// What became of a particle.
 ///   x, v      at the step's end [m], [m/s]
-///   impacts   surfaces met
+///   impacts   surfaces met on the way
 ///   squeezed  there was not room for its radius: it overlaps, on its own side of everything
 ///   crushed   there was no room at all: surfaces came together or crossed where it was; it is on its side of those it
 ///             has been carried by, and may be on the wrong one of the last that came
@@ -29,7 +29,7 @@ struct Slid {
   Vec3 x = Vec3::Zero(), v = Vec3::Zero();
   int impacts = 0;
   bool squeezed = false, crushed = false, stopped = false;
-  Index surface = 0;  ///< the last one met; 0: none
+  Index surface = 0;  ///< the last one met, or touched at the end; 0: none
 };
 
 /// A particle of radius r > 0 that would go from x to x + dx in the step of the obstacles' motions, with velocity v
@@ -55,7 +55,8 @@ struct SlideReport {
 /// Those whose swept box meets no obstacle's cost one box test.
 ///   x, v, dx  n each; x and v changed
 ///   r         n, or one for all; > 0
+///   surfaces  out: for those whose velocity was changed the last surface that did, 0 for others; n, or empty: not asked for
 SlideReport slide_all(const Obstacles& obstacles, std::span<Vec3> x, std::span<const Vec3> dx, std::span<Vec3> v, std::span<const Real> r,
-                      const SlideOptions& options = {});
+                      const SlideOptions& options = {}, std::span<Index> surfaces = {});
 
 }  // namespace effuse::geometry

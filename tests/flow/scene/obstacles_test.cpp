@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "flow/effects/moving_obstacles.h"
+#include "flow/effects/solid_world.h"
 #include "geometry/procedural/primitives.h"
 #include "tests/flow/effects/scene_lines.h"
 
@@ -53,7 +53,7 @@ TEST(Obstacles, MoveByTheirKeysAndMeshesWithYUpAreTurned) {
   ASSERT_EQ(placed.size(), 1u);
   EXPECT_NEAR((placed[0].track.at(2).position - Vec3(5, 0, 5)).norm(), 0, 1e-12);
   EXPECT_NEAR((placed[0].shape.bounds().max() - Vec3(1, 0, 3)).norm(), 0, 1e-12) << "up is z";
-  MovingObstacles moving(placed);
+  SolidWorld moving(placed, {}, nullptr);
   const sph::SolidOptions solids = moving.solids();
   ASSERT_TRUE(solids.move);
   solids.move(1.5, 2);

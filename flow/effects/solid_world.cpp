@@ -1,0 +1,151 @@
+#include "flow/effects/solid_world.h"
+
+#include "geometry/base/check.h"
+
+namespace effuse::flow {
+
+using bodies::BodyId;
+using bodies::RigidBodies;
+using bodies::Shape;
+using geometry::RigidMotion;
+using geometry::RigidPose;
+using sph::Movable;
+
+SolidWorld::SolidWorld(const std::vector<PlacedObstacle>& obstacles, const std::vector<PlacedBody>& bodies, const geometry::Terrain* terrain, const bodies::BodyOptions& options)
+    : friction_(1, 1.0) {
+  for (const PlacedObstacle& each : obstacles) {
+    tracks_.push_back(each.track);
+    friction_.push_back(each.friction);
+    obstacles_.add({each.shape, RigidMotion(each.track.at(0)), each.temperature, static_cast<Index>(tracks_.size())});
+  }
+  if (!bodies.empty()) {
+    bodies_ = std::make_unique<RigidBodies>(options, terrain ? std::optional(*terrain) : std::nullopt);
+    for (const PlacedObstacle& each : obstacles) {
+      const auto shape = Shape::mesh(each.shape.mesh());
+      driven_.push_back(each.track.keys().size() > 1 ? bodies_->add_driven(shape, each.track.at(0)) : bodies_->add_static(shape, each.track.at(0)));
+    }
+    for (const PlacedBody& each : bodies) {
+      ids_.push_back(bodies_->add(each.shape, each.density, each.pose, each.surface, each.velocity, each.spin));
+      friction_.push_back(each.friction);
+      const geometry::CollisionMesh mesh = each.shape->kind() == Shape::Kind::kMesh ? each.shape->collision_mesh() : geometry::CollisionMesh(each.shape->surface());
+      obstacles_.add({mesh, RigidMotion(bodies_->body_pose(ids_.back())), each.temperature, static_cast<Index>(tracks_.size() + ids_.size())});
+      before_.push_back(bodies_->body_pose(ids_.back()));
+    }
+    acceleration_.assign(ids_.size(), options.gravity);
+  }
+  obstacles_.update();
+}
+
+void SolidWorld::go(std::size_t i, const RigidMotion& motion) {
+  const RigidMotion& now = obstacles_[i].motion;
+  if (motion.moves() || now.moves() || motion.to().position != now.to().position || motion.to().orientation.coeffs() != now.to().orientation.coeffs()) obstacles_.move(i, motion);
+}
+
+void SolidWorld::stand(Real time, Real dt) {
+  time_ = time;
+  for (std::size_t i = 0; i < tracks_.size(); ++i) go(i, tracks_[i].between(time, time + dt).turned_back());
+  for (std::size_t b = 0; b < ids_.size(); ++b) {
+    const RigidPose now = bodies_->body_pose(ids_[b]);
+    RigidPose next = now;
+    next.position += dt * velocity(b);
+    next.orientation = geometry::rotation_by(dt * bodies_->spin(ids_[b])) * now.orientation;
+    go(tracks_.size() + b, RigidMotion(now, next, dt).turned_back());
+  }
+  obstacles_.update();
+}
+
+void SolidWorld::move(Real from, Real to) {
+  for (std::size_t i = 0; i < tracks_.size(); ++i) go(i, tracks_[i].between(from, to));
+  for (std::size_t b = 0; b < ids_.size(); ++b) go(tracks_.size() + b, RigidMotion(before_[b], bodies_->body_pose(ids_[b]), last_dt_));
+  obstacles_.update();
+}
+
+void SolidWorld::tell(std::vector<Movable>& movable) const {
+  movable.clear();
+  for (std::size_t b = 0; b < ids_.size(); ++b) {
+    const BodyId id = ids_[b];
+    Movable m;
+    m.surface = static_cast<Index>(tracks_.size() + b + 1);
+    m.centre = bodies_->centres()[id];
+    m.inverse_mass = 1 / bodies_->mass(id);
+    const Mat3 R = bodies_->orientations()[id].toRotationMatrix();
+    const Vec3 moments = bodies_->mass(id) / bodies_->shape(id).volume() * bodies_->shape(id).moments();
+    m.inverse_inertia = R * moments.cwiseInverse().asDiagonal() * R.transpose();
+    m.velocity = bodies_->momenta()[id] * m.inverse_mass;
+    m.spin = bodies_->spin(id);
+    m.acceleration = acceleration_[b];
+    movable.push_back(m);
+  }
+}
+
+void SolidWorld::take(std::span<const Movable> movable, Real dt) {
+  CHECK_EQ(movable.size(), ids_.size());
+  std::vector<Vec3> given(ids_.size());
+  for (std::size_t b = 0; b < ids_.size(); ++b) {
+    const BodyId id = ids_[b];
+    const Movable& m = movable[b];
+    before_[b] = bodies_->body_pose(id);
+    const Vec3 before = bodies_->momenta()[id] * m.inverse_mass, by_lava = m.velocity - dt * acceleration_[b] - before;
+    // Over the whole step, as gravity: an impulse at its begin would let a floating body bob within the step.
+    bodies_->add_force(id, by_lava / m.inverse_mass / dt, bodies_->centres()[id]);
+    const Vec3 spun = m.spin - bodies_->spin(id);
+    bodies_->add_torque(id, m.inverse_inertia.inverse() * spun / dt);
+    given[b] = before + by_lava;
+  }
+  for (std::size_t i = 0; i < tracks_.size(); ++i)
+    if (tracks_[i].keys().size() > 1) bodies_->move_to(driven_[i], tracks_[i].at(time_ + dt));
+  bodies_->step(dt);
+  for (std::size_t b = 0; b < ids_.size(); ++b) acceleration_[b] = (bodies_->momenta()[ids_[b]] / bodies_->mass(ids_[b]) - given[b]) / dt;
+  last_dt_ = dt;
+}
+
+sph::SolidOptions SolidWorld::solids() {
+  if (obstacles_.empty()) return {};
+  sph::SolidOptions options{&obstacles_, {}, friction_};
+  bool moves = has_bodies();
+  for (const geometry::PoseTrack& track : tracks_) moves = moves || track.keys().size() > 1;
+  if (moves) {
+    options.stand = [this](Real time, Real dt) { stand(time, dt); };
+    options.move = [this](Real from, Real to) { move(from, to); };
+  }
+  if (!has_bodies()) return options;
+  options.movable = [this](std::vector<Movable>& movable) { tell(movable); };
+  options.moved = [this](std::span<const Movable> movable, Real dt) { take(movable, dt); };
+  options.push = [this](Index surface, const Vec3& impulse, const Vec3& at) {
+    if (surface > tracks_.size()) bodies_->add_impulse(ids_[surface - tracks_.size() - 1], impulse, at);
+  };
+  return options;
+}
+
+std::vector<RigidPose> SolidWorld::poses() const {
+  std::vector<RigidPose> all;
+  for (const BodyId id : ids_) all.push_back(bodies_->pose(id));
+  return all;
+}
+
+Vec3 SolidWorld::velocity(std::size_t body) const { return bodies_->momenta()[ids_[body]] / bodies_->mass(ids_[body]); }
+
+void SolidWorld::add_to(StateHash& hash) const {
+  if (!has_bodies()) return;
+  bodies_->add_to(hash);
+  hash.add(std::span<const Vec3>(acceleration_));
+}
+
+void SolidWorld::save(StateWriter& out) const {
+  if (!has_bodies()) return;
+  bodies_->save(out);
+  out.array("body_acceleration", acceleration_);
+}
+
+void SolidWorld::load(StateReader& in) {
+  if (!has_bodies()) return;
+  bodies_->load(in);
+  std::vector<Vec3> acceleration;
+  in.array("body_acceleration", acceleration);
+  if (acceleration.size() != ids_.size()) throw InputError(Place{}, "the checkpoint holds other rigid bodies");
+  acceleration_ = std::move(acceleration);
+  for (std::size_t b = 0; b < ids_.size(); ++b) before_[b] = bodies_->body_pose(ids_[b]);
+  last_dt_ = 0;
+}
+
+}  // namespace effuse::flow

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "flow/bodies/rigid_bodies.h"
+#include "flow/scene/obstacles.h"
+#include "flow/sph/solids.h"
+
+namespace effuse::flow {
+
+/// A rigid body of a scene, placed: metres, z up, from the terrain's origin.
+struct PlacedBody {
+  std::string name;
+  std::shared_ptr<const bodies::Shape> shape;
+  Real density = 0;  ///< [kg/m^3]
+  geometry::RigidPose pose;
+  bodies::Surface surface;
+  Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();
+  Real temperature = 0;  ///< of its surface [K]; 0: the ground's
+  Real friction = 1;     ///< of lava on it
+};
+
+/// All that is solid beside the terrain, as one lava meets it: obstacles on their tracks and rigid bodies, which meet one another and
+/// the terrain, too. Lava and bodies move each other: both solves of a lava step hold the bodies' velocities as unknowns beside the
+/// particles' (sph::Movable), what these say is given to the bodies as an impulse, then the bodies take their own step,
+/// as long, with gravity and their contacts. Momentum is kept, to the tolerance of the viscosity's solve.
+///
+/// What a body rests on is known to the lava by how it held the body up in the step before (Movable::acceleration).
+/// Surfaces are numbered from 1: obstacles, then bodies, in their order. Not to be moved while a lava refers to it.
+class SolidWorld {
+ public:
+  SolidWorld(const std::vector<PlacedObstacle>& obstacles, const std::vector<PlacedBody>& bodies, const geometry::Terrain* terrain, const bodies::BodyOptions& options = {});
+
+  /// For ModernLava; refers to this object. No obstacles of any kind: empty.
+  sph::SolidOptions solids();
+  void stand(Real time, Real dt);
+  /// Obstacles' ways from one moment to another [s]; bodies', that of their last step.
+  void move(Real from, Real to);
+
+  bool has_bodies() const { return bodies_ != nullptr; }
+  const bodies::RigidBodies& bodies() const { return *bodies_; }
+  /// Poses of the bodies' frames, in their order.
+  std::vector<geometry::RigidPose> poses() const;
+  Vec3 velocity(std::size_t body) const;
+
+  void add_to(StateHash& hash) const;
+  void save(StateWriter& out) const;
+  void load(StateReader& in);
+
+ private:
+  void go(std::size_t obstacle, const geometry::RigidMotion& motion);
+  void tell(std::vector<sph::Movable>& movable) const;
+  void take(std::span<const sph::Movable> movable, Real dt);
+
+  std::vector<geometry::PoseTrack> tracks_;
+  std::vector<bodies::BodyId> driven_;   // of each obstacle; only where there are bodies
+  std::vector<bodies::BodyId> ids_;      // of bodies
+  std::vector<Real> friction_;
+  std::vector<Vec3> acceleration_;       // of bodies, by all but lava, in the last step [m/s^2]
+  std::vector<geometry::RigidPose> before_;  // body axes at the last step's begin
+  Real last_dt_ = 0, time_ = 0;
+  geometry::Obstacles obstacles_;
+  std::unique_ptr<bodies::RigidBodies> bodies_;
+};
+
+}  // namespace effuse::flow
