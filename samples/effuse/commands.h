@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -17,12 +18,14 @@ void print_document(const std::string& json);
 struct CommonOptions {
   bool json = false, quiet = false;
   int threads = 0;  ///< 0: all
+  std::string program = "effuse";  ///< as it was called: for lines that say what to call next
 };
 
 struct RunCommand {
   std::filesystem::path scene, folder;
   int frames = 0;  ///< 0: as the scene says
   bool resume = false, force = false;
+  bool stats = false;  ///< print all zones of the profile
   std::vector<std::string> set;
 };
 ExitCode run(const RunCommand& command, const CommonOptions& common);
@@ -52,6 +55,10 @@ struct SkinCommand {
   double drop_volume = 0;                        ///< pieces and bubbles of fewer particles are left out
   std::string tessellation = "levelset";         ///< or "voronoi"
   double coarsen = 0;                            ///< in particle spacings, 2 radii; 0: not
+  std::string kind = "none";                     ///< smooth, or a name of skin::kSkinKindNames: displaced and coloured
+  std::optional<double> amplitude, edge;         ///< of the displacement, and of the mesh [particle spacings]; absent: the kind's, the cube size
+  std::optional<std::uint64_t> seed;
+  std::string temperature;                       ///< of particles whose file has none, "1100" [K] or with its unit; empty: cold rock
   std::filesystem::path terrain;                 ///< where the skin ends, in the particles' coordinates; empty: none
   std::vector<double> origin;                    ///< three numbers that are subtracted from the particles' coordinates, or none
   bool sph_normals = true;                       ///< from the field's gradient; else of the triangles

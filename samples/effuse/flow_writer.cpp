@@ -25,10 +25,9 @@ using Layer = FlowMap::Layer;
 
 namespace {
 
-constexpr std::string_view kMagic = "effuse flow record 2";
+constexpr std::string_view kMagic = "effuse flow record 3";
 constexpr const char* kHeader =
-    "frame,time_s,front_m,front_x,front_y,inundated_m2,covered_m2,volume_m3,discharge_m3_s,max_speed_m_s,mean_temperature_K,max_temperature_K,min_temperature_K,"
-    "radiated_J,convected_J,ground_J,vent_J,stored_J,viscous_J,left_J\n";
+    "frame,time_s,front_m,front_x,front_y,inundated_m2,covered_m2,volume_m3,discharge_m3_s,max_speed_m_s,mean_temperature_K,max_temperature_K,min_temperature_K";
 constexpr const char* kHeatBudget[] = {"radiated_J", "convected_J", "ground_J", "vent_J", "stored_J", "viscous_J", "left_J"};
 
 const flow::Effect* first_with_particles(const flow::Simulation& simulation) {
@@ -71,6 +70,9 @@ FlowWriter::FlowWriter(const LoadedScene& loaded, fs::path folder) : loaded_(loa
   if (!effect_) return;
   const Real spacing = effect_->spacing();
   map_.emplace(flow::sph::map_grid(*loaded.terrain, s.map_cell, spacing), s.arrival_thickness > 0 ? s.arrival_thickness : spacing / 2);
+  for (const char* term : kHeatBudget)
+    for (const auto& [name, value] : effect_->figures())
+      if (name == term) budget_.emplace_back(term);
   vents_ = vents_of(loaded.resolved, effect_->name(), loaded.terrain->georeference().origin.head<2>());
 }
 
@@ -148,14 +150,16 @@ std::string FlowWriter::row(const flow::Effect& effect) {
   add(mean);
   add(hottest);
   add(coldest);
-  for (const char* term : kHeatBudget) add(figure(term));
+  for (const std::string& term : budget_) add(figure(term));
   return line + "\n";
 }
 
 void FlowWriter::write_series() const {
   if (!effect_ || !loaded_.skin.series) return;
   ZONE("write.flow_csv");
-  write_file(folder_ / "flow.csv", kHeader + rows_);
+  std::string header = kHeader;
+  for (const std::string& term : budget_) header += "," + term;
+  write_file(folder_ / "flow.csv", header + "\n" + rows_);
 }
 
 void FlowWriter::write_map(const std::string& name, Layer layer, const std::string& unit, const std::string& description) const {

@@ -32,7 +32,8 @@ namespace effuse {
 ///   discharge_m3_s              let out by the vents, mean since the frame before
 ///   max_speed_m_s, mean_temperature_K, max_temperature_K, min_temperature_K   over particles: of the effect's figures
 ///                               if it has all three temperatures, else of what its points show (their surfaces, maybe)
-///   radiated_J convected_J ground_J vent_J stored_J viscous_J left_J   heat budget since the start, as the effect gives it
+///   radiated_J convected_J ground_J vent_J stored_J viscous_J left_J   heat budget since the start; columns are there for the terms that
+///                               the effect has among its figures (the classic lava has none)
 ///
 /// Everything is sampled at frames: a run of more frames a second sees more. What has been gathered is kept beside
 /// each checkpoint (checkpoints/flow.0042.state), so that a run resumed writes the same bytes.
@@ -69,6 +70,7 @@ class FlowWriter {
   std::filesystem::path folder_;
   const flow::Effect* effect_ = nullptr;  // null: nothing to do
   std::vector<flow::sph::PlanLine> vents_;
+  std::vector<std::string> budget_;  // columns
   std::optional<flow::sph::FlowMap> map_;
 
   // Of the frames so far, all of it in the record.

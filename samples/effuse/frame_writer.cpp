@@ -9,6 +9,7 @@
 #include "skin/color/lava_color.h"
 #include "skin/preview/preview.h"
 #include "skin/surface/level_set.h"
+#include "samples/effuse/obstacle_meshes.h"
 #include "skin/tessellate/make_skin.h"
 
 namespace effuse {
@@ -19,8 +20,9 @@ namespace {
 std::string numbered(const char* stem, int frame, const char* extension) { return fmt::format("{}.{:04}.{}", stem, frame, extension); }
 }  // namespace
 
-FrameWriter::FrameWriter(const flow::Scene& scene, const skin::SkinSettings& settings, const geometry::Terrain& terrain, fs::path folder)
-    : scene_(scene), settings_(settings), terrain_(terrain), folder_(std::move(folder)) {
+FrameWriter::FrameWriter(const flow::Scene& scene, const skin::SkinSettings& settings, const geometry::Terrain& terrain,
+                         const std::vector<flow::PlacedObstacle>& obstacles, fs::path folder)
+    : scene_(scene), settings_(settings), terrain_(terrain), obstacles_(obstacles), folder_(std::move(folder)) {
   if (settings.preview) preview_ = std::make_unique<skin::Preview>(terrain.mesh());
 }
 FrameWriter::~FrameWriter() = default;
@@ -40,6 +42,10 @@ void FrameWriter::write_terrain() {
   ZONE("write.terrain");
   skin::write_ply(folder_ / "terrain.ply", terrain_.mesh(), metadata(0, 0));
   skin::write_glb(folder_ / "terrain.glb", terrain_.mesh(), metadata(0, 0));
+  if (obstacles_.empty()) return;
+  const geometry::TriMesh solids = obstacles_at(obstacles_, scene_.frame_time(1));
+  skin::write_ply(folder_ / "obstacles.ply", solids, metadata(0, 0));
+  skin::write_glb(folder_ / "obstacles.glb", solids, metadata(0, 0));
 }
 
 FrameWriter::Result FrameWriter::write_frame(const flow::Simulation& simulation) {
@@ -71,8 +77,10 @@ FrameWriter::Result FrameWriter::write_frame(const flow::Simulation& simulation)
   if (settings_.obj) skin::write_obj(frames / numbered("skin", frame, "obj"), mesh, about);
   if (settings_.glb) skin::write_glb(frames / numbered("skin", frame, "glb"), mesh, about);
   if (settings_.vdb) skin::write_vdb(frames / numbered("lava", frame, "vdb"), skin.surface, about);
+  const geometry::TriMesh solids = obstacles_.empty() ? geometry::TriMesh() : obstacles_at(obstacles_, simulation.time());
+  if (settings_.ply && any_moves(obstacles_)) skin::write_ply(frames / numbered("obstacles", frame, "ply"), solids, about);
   if (preview_) {
-    const skin::Image image = preview_->render(mesh, skin::picture_at(settings_, terrain_, frame / scene_.fps));
+    const skin::Image image = preview_->render(in_one_picture(mesh, solids), skin::picture_at(settings_, terrain_, frame / scene_.fps));
     skin::write_png(folder_ / "preview" / numbered("preview", frame, "png"), image);
   }
   return result;
@@ -113,7 +121,9 @@ void FrameWriter::write_manifest(int frames_done, const std::vector<std::pair<st
   m["terrain"] = {{"files", {"terrain.ply", "terrain.glb"}},
                   {"min", {box.min().x(), box.min().y(), box.min().z()}},
                   {"max", {box.max().x(), box.max().y(), box.max().z()}}};
-  ordered_json files;
+  if (!obstacles_.empty()) m["obstacles"] = {{"files", {"obstacles.ply", "obstacles.glb"}}};
+  ordered_json files = ordered_json::object();
+  if (settings_.ply && any_moves(obstacles_)) files["obstacles"] = "frames/obstacles.####.ply";
   if (settings_.ply) files["ply"] = "frames/skin.####.ply";
   if (settings_.obj) files["obj"] = "frames/skin.####.obj";
   if (settings_.glb) files["glb"] = "frames/skin.####.glb";

@@ -19,10 +19,11 @@ namespace effuse {
 /// writes the bytes it would have.
 class FrameWriter {
  public:
-  FrameWriter(const flow::Scene& scene, const skin::SkinSettings& settings, const geometry::Terrain& terrain, std::filesystem::path folder);
+  FrameWriter(const flow::Scene& scene, const skin::SkinSettings& settings, const geometry::Terrain& terrain, const std::vector<flow::PlacedObstacle>& obstacles,
+              std::filesystem::path folder);
   ~FrameWriter();
 
-  /// terrain.ply, terrain.glb
+  /// terrain.ply, terrain.glb; obstacles.ply, obstacles.glb: where they are at the first frame
   void write_terrain();
 
   struct Result {
@@ -33,7 +34,7 @@ class FrameWriter {
     skin::TriangleShapes shapes;  ///< of its triangles
     std::size_t held_back = 0;    ///< vertices displaced less than asked for
   };
-  /// frames/skin.0001.*, frames/lava.0001.vdb, preview/preview.0001.png
+  /// frames/skin.0001.*, frames/lava.0001.vdb, frames/obstacles.0001.ply if any moves, preview/preview.0001.png
   Result write_frame(const flow::Simulation& simulation);
 
   /// preview/contact_sheet.png of twelve pictures spread over the film; nothing without pictures.
@@ -47,6 +48,7 @@ class FrameWriter {
   const flow::Scene& scene_;
   const skin::SkinSettings& settings_;
   const geometry::Terrain& terrain_;
+  const std::vector<flow::PlacedObstacle>& obstacles_;
   std::filesystem::path folder_;
   std::unique_ptr<skin::Preview> preview_;
   skin::SurfaceCache last_;  // saves work, changes nothing

@@ -8,21 +8,27 @@
 #include "importers/scene/scene_file.h"
 #include "importers/terrain/import_terrain.h"
 #include "samples/effuse/flow_writer.h"
+#include "samples/effuse/misspelt.h"
+#include "samples/effuse/obstacle_meshes.h"
 
 namespace effuse {
 
 namespace {
 /// The tables that decide the state of frame n, whatever the number of frames and the files made of it.
-std::string state_key(const flow::Node& resolved, const geometry::Terrain& terrain) {
+std::string state_key(const flow::Node& resolved, const geometry::Terrain& terrain, const std::vector<flow::PlacedObstacle>& obstacles) {
   StateHash hash;
   for (const auto& [name, value] : resolved.entries) {
     if (name == "skin" || name == "output" || name == "preview" || name == "name") continue;
     flow::Node part;
     flow::Node& copy = part.set(name, value);
     if (name == "film") copy.set("frames", flow::Node{});
-    if (name == "terrain") copy.set("file", flow::Node{});  // what it holds counts, not where it lies
+    // What files hold counts, not where they lie.
+    if (name == "terrain") copy.set("file", flow::Node{});
+    if (name == "obstacle")
+      for (flow::Node& one : copy.items) one.set("file", flow::Node{});
     hash.add(importers::to_toml(part));
   }
+  for (const flow::PlacedObstacle& each : obstacles) hash.add(std::span<const Vec3>(each.shape.mesh().positions));
   hash.add(std::span<const Vec3>(terrain.mesh().positions));
   hash.add(terrain.georeference().origin.x());
   hash.add(terrain.georeference().origin.y());
@@ -62,26 +68,36 @@ std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const
       for (const Fault& fault : error.faults()) faults.push_back({scene.terrain_place, to_string(fault)});
     }
   }
+  if (loaded->terrain) loaded->obstacles = load_obstacles(scene, file.parent_path(), *loaded->terrain, faults, loaded->notes);
   if (!faults.empty() && loaded->terrain) {
     for (const flow::EffectPlan& plan : scene.effects)
-      for (const Fault& fault : plan.misfits(flow::World{&*loaded->terrain, scene.seed})) faults.push_back(fault);
+      for (const Fault& fault : plan.misfits(flow::World{&*loaded->terrain, scene.seed, &loaded->obstacles})) faults.push_back(fault);
   }
   if (faults.empty() && loaded->terrain) {
-    loaded->simulation = std::make_unique<flow::Simulation>(scene, flow::World{&*loaded->terrain, scene.seed});
+    loaded->simulation = std::make_unique<flow::Simulation>(scene, flow::World{&*loaded->terrain, scene.seed, &loaded->obstacles});
     check_map(loaded->skin, *loaded->terrain, *loaded->simulation);
+    skin::check_camera(loaded->skin, *loaded->terrain, scene.frames, scene.fps);
     flow::Node resolved = root.resolved();
-    // The resolved scene is written elsewhere: there, too, it must find its terrain.
+    // The resolved scene is written elsewhere: there, too, it must find its files.
+    const auto whole = [](const std::filesystem::path& path) {
+      flow::Node node_of;
+      node_of.kind = flow::Node::Kind::kText;
+      node_of.text = path.string();
+      return node_of;
+    };
     for (auto& [name, table] : resolved.entries) {
-      if (name != "terrain") continue;
-      flow::Node path;
-      path.kind = flow::Node::Kind::kText;
-      path.text = terrain_path.string();
-      table.set("file", path);
+      if (name == "terrain") table.set("file", whole(terrain_path));
+      if (name != "obstacle") continue;
+      for (flow::Node& one : table.items)
+        if (const flow::Node* path = one.find("file")) one.set("file", whole(std::filesystem::absolute(file.parent_path() / path->text).lexically_normal()));
     }
     loaded->resolved = importers::to_toml(resolved);
-    loaded->key = state_key(resolved, *loaded->terrain);
+    loaded->key = state_key(resolved, *loaded->terrain, loaded->obstacles);
   }
   if (!faults.empty()) {
+    std::vector<std::string> effects;
+    for (const flow::EffectKind& kind : flow::effect_kinds()) effects.push_back(kind.name);
+    faults = told_once(std::move(faults), effects);
     std::stable_sort(faults.begin(), faults.end(), [](const Fault& a, const Fault& b) { return a.place.line < b.place.line; });
     throw InputError(faults);
   }

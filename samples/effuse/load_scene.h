@@ -20,7 +20,8 @@ struct LoadedScene {
   std::string resolved;  ///< TOML, every default filled in
   std::string key;       ///< hash of what the simulation's state depends on: for checkpoints
   std::optional<geometry::Terrain> terrain;
-  std::vector<std::string> notes;  ///< of the terrain's import
+  std::vector<flow::PlacedObstacle> obstacles;  ///< the simulation refers to them
+  std::vector<std::string> notes;  ///< of the imports
   std::unique_ptr<flow::Simulation> simulation;
 };
 

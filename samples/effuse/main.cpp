@@ -86,9 +86,17 @@ void add_skin_options(CLI::App* verb, effuse::SkinCommand& skin) {
   verb->add_option("--tessellation", skin.tessellation, "levelset: triangles of one size; voronoi: fans of triangles, a spacing wide, on each particle's part of the surface. PLY carries the particle's id as region: of vertices, and with voronoi of faces [levelset]")
       ->check(CLI::IsMember({"levelset", "voronoi"}));
   verb->add_option("--coarsen", skin.coarsen, "fewer triangles where the surface is flat to so many particle spacings (2 radii), 0.1 say; 0: none; goes with levelset [0]")->check(CLI::Range(0.0, 1.0));
+  verb->add_option("--kind", skin.kind,
+                   "none: the smooth skin. aa, pahoehoe, block, obsidian, noise: displaced as such lava, and coloured, with glow where particles have a temperature. What the particles' `rest` says moves the detail along; without it, in a "
+                   "sequence with ids, the place where each id was first seen (skin the whole sequence in one call); else it stands still in space, and the lava swims through it. VDB stays smooth [none]")
+      ->check(CLI::IsMember({"none", "aa", "pahoehoe", "block", "obsidian", "noise"}));
+  verb->add_option("--amplitude", skin.amplitude, "with --kind: half the height of its bumps where cold, in particle spacings (2 radii); 0: colours alone [0.25]")->check(CLI::Range(0.0, 10.0));
+  verb->add_option("--edge", skin.edge, "with --kind: the mesh is refined to edges of so many particle spacings, 0.1 say for close-ups [the cube size]")->check(CLI::Range(0.05, 10.0));
+  verb->add_option("--seed", skin.seed, "with --kind: another one, other bumps [1]");
+  verb->add_option("--temperature", skin.temperature, "with --kind: of particles whose file has none, 1100 (kelvin) or '950 degC'; absent: cold rock that does not glow");
   verb->add_option("--terrain", skin.terrain, "ground to end the skin at: a DEM grid (ESRI ASCII) or a mesh, z up, in the coordinates of the particles; what they enclose is counted above it");
   verb->add_option("--origin", skin.origin, "x y z that the outputs count from: subtracted from all positions, for map coordinates and others that floats are too coarse for; --terrain and --particle-aabb stay in the particles' own")->expected(3);
-  verb->add_option("--sph-normals", skin.sph_normals, "on: normals of the field's gradient, off: of the triangles; normals are always written [on]")->transform(CLI::CheckedTransformer(switches));
+  verb->add_option("--sph-normals", skin.sph_normals, "on: normals of the field's gradient, off: of the triangles, as displaced skins always have them; normals are always written [on]")->transform(CLI::CheckedTransformer(switches));
   verb->add_option_function<bool>(
           "--normals",
           [](bool on) {
@@ -105,7 +113,14 @@ void add_skin_options(CLI::App* verb, effuse::SkinCommand& skin) {
   verb->footer("Exit codes: 0 done, 1 a check of the mesh failed, 2 wrong use or bad input, 5 out of disk or memory.");
   // Ranges let nan through.
   const CLI::Validator finite([](std::string& text) { return std::isfinite(std::strtod(text.c_str(), nullptr)) ? "" : "must be a finite number"; }, "");
-  for (const char* name : {"-r", "-l", "-c", "-t", "--drop-volume", "--coarsen", "--particle-aabb-min", "--particle-aabb-max"}) verb->get_option(name)->check(finite);
+  for (const char* name : {"-r", "-l", "-c", "-t", "--drop-volume", "--coarsen", "--amplitude", "--edge", "--particle-aabb-min", "--particle-aabb-max"}) verb->get_option(name)->check(finite);
+}
+
+void add_set(CLI::App* verb, std::vector<std::string>& assignments) {
+  verb->add_option("--set", assignments, "overrides a value of the scene, one word: --set lava.spacing='2 m' --set preview.target=[10,20]; may be given several times")
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false)
+      ->check(CLI::Validator([](std::string& text) { return text.find('=') == std::string::npos ? fmt::format("'{}' has no '=', wanted KEY=VALUE in one word", text) : std::string(); }, ""));
 }
 
 bool out_of_resources(const std::system_error& error) {
@@ -131,6 +146,7 @@ int main(int argc, char** argv) {
   app.footer("Exit codes: 0 done, 1 failed, 2 wrong use or bad input, 4 unstable, 5 out of disk or memory, 130 interrupted.");
 
   effuse::CommonOptions common;
+  if (argc > 0 && argv[0][0] != '\0') common.program = argv[0];
   const auto add_common = [&](CLI::App* verb) {
     verb->add_flag("--json", common.json, "one JSON document on stdout, nothing else there");
     verb->add_flag("-q,--quiet", common.quiet, "no progress, no talk");
@@ -143,17 +159,18 @@ int main(int argc, char** argv) {
   run_verb->add_option("scene", run.scene, "scene file (TOML)")->required();
   run_verb->add_option("-o,--output", run.folder, "folder to write; out/SCENE when absent");
   run_verb->add_option("--frames", run.frames, "make this many frames")->check(CLI::Range(1, 9999));
-  run_verb->add_flag("--resume", run.resume, "go on from the newest checkpoint in the folder");
+  run_verb->add_flag("--resume", run.resume, "go on with the run in the folder, from its newest checkpoint");
   run_verb->add_flag("--force", run.force, "replace the run that the folder holds");
-  run_verb->add_option("--set", run.set, "key=value, overrides the scene: --set lava.spacing='2 m'")->allow_extra_args(false);
+  run_verb->add_flag("--stats", run.stats, "say at the end where all of the time went; run.json has it in any case");
+  add_set(run_verb, run.set);
 
   effuse::CheckCommand check;
   CLI::App* check_verb = add_common(app.add_subcommand("check", "say all that is wrong with a scene, or what it would cost"));
   check_verb->add_option("scene", check.scene, "scene file (TOML)")->required();
-  check_verb->add_option("--set", check.set, "key=value, overrides the scene")->allow_extra_args(false);
+  add_set(check_verb, check.set);
 
   std::vector<std::filesystem::path> files;
-  CLI::App* info_verb = add_common(app.add_subcommand("info", "facts of files: terrain, meshes, volumes, scenes, run folders"));
+  CLI::App* info_verb = add_common(app.add_subcommand("info", "facts of files: terrain, meshes, volumes, scenes, runs (their folder, or run.json in it)"));
   info_verb->add_option("file", files, "files")->required();
 
   CLI::App* effects_verb = add_common(app.add_subcommand("effects", "the effects there are, and their parameters"));

@@ -13,7 +13,7 @@ void remove_run(const fs::path& folder) {
     std::regex name;
   };
   const std::vector<Ours> ours = {
-      {"frames", std::regex(R"((skin|lava)\.\d+(\.part)?\.(ply|obj|glb|vdb))")},
+      {"frames", std::regex(R"((skin|lava|obstacles)\.\d+(\.part)?\.(ply|obj|glb|vdb))")},
       {"preview", std::regex(R"((preview\.\d+|contact_sheet)(\.part)?\.png)")},
       {"maps", std::regex(R"((max_thickness|max_temperature|arrival_time|deposit|thickness)(\.\d+)?(\.part)?\.(tif|asc|prj))")},
       {"checkpoints", std::regex(R"((checkpoint|flow)\.\d+(\.part)?\.state)")}};

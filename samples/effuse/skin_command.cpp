@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "geometry/base/log.h"
+#include "geometry/base/units.h"
 #include "geometry/base/zones.h"
 #include "geometry/mesh/measure.h"
 #include "geometry/mesh/self_intersections.h"
@@ -19,6 +20,8 @@
 #include "importers/points/spacing.h"
 #include "importers/terrain/import_terrain.h"
 #include "samples/effuse/commands.h"
+#include "samples/effuse/first_positions.h"
+#include "skin/color/lava_color.h"
 #include "skin/surface/level_set.h"
 #include "skin/tessellate/make_skin.h"
 #include "skin/write/write_mesh.h"
@@ -268,6 +271,39 @@ skin::LevelSetOptions level_set_options(const SkinCommand& command, Real radius,
   return options;
 }
 
+// The detail.
+
+/// What --kind and its companions ask for; nothing of --kind none. Lengths in spacings, so that nothing is left to fill in but them.
+std::optional<skin::DisplaceOptions> detail_options(const SkinCommand& command) {
+  const auto kind = std::find(skin::kSkinKindNames.begin(), skin::kSkinKindNames.end(), command.kind);
+  if (kind == skin::kSkinKindNames.end()) {
+    if (command.amplitude || command.edge || command.seed || !command.temperature.empty())
+      throw InputError(Place{}, "--amplitude, --edge, --seed and --temperature go with --kind: the smooth skin has no detail and no colour");
+    return std::nullopt;
+  }
+  if (std::all_of(command.meshes.begin(), command.meshes.end(), [](const fs::path& file) { return format_of(file) == Format::kVdb; }))
+    throw InputError(Place{}, fmt::format("--kind {} goes with a mesh: .vdb holds the smooth surface", command.kind));
+  skin::DisplaceOptions detail;
+  detail.kind = static_cast<skin::SkinKind>(kind - skin::kSkinKindNames.begin());
+  detail.amplitude = command.amplitude.value_or(detail.amplitude);
+  detail.edge = command.edge.value_or(command.cube_size / 2);
+  detail.seed = command.seed.value_or(detail.seed);
+  return detail;
+}
+
+/// --temperature [K].
+std::optional<Real> told_temperature(const SkinCommand& command) {
+  if (command.temperature.empty()) return std::nullopt;
+  Real kelvin = 0;
+  try {
+    kelvin = parse_quantity(command.temperature, "K");
+  } catch (const std::invalid_argument& error) {
+    throw InputError(Place{}, fmt::format("--temperature: {}", error.what()));
+  }
+  if (!(kelvin > 0 && kelvin <= 5000)) throw InputError(Place{}, fmt::format("--temperature {} is {:.6g} K, wanted more than 0 and at most 5000 K", command.temperature, kelvin));
+  return kelvin;
+}
+
 // The ground.
 
 /// As imported, but counted from `wanted`, in the file's coordinates, instead of its own origin.
@@ -327,7 +363,7 @@ geometry::TriMesh turned_to_z_up(geometry::TriMesh mesh) {
   for (Vec3& x : mesh.positions) turn(x.y(), x.z());
   for (Vec3& n : mesh.normals) turn(n.y(), n.z());
   for (auto& [name, attribute] : mesh.attributes)
-    if (attribute.width == 3)
+    if (attribute.width == 3 && name != "color" && name != "glow")
       for (std::size_t i = 0; i + 2 < attribute.values.size(); i += 3) turn(attribute.values[i + 1], attribute.values[i + 2]);
   return mesh;
 }
@@ -384,6 +420,8 @@ class Skinner {
     if (box_ && box_->isEmpty()) throw InputError(Place{}, "--particle-aabb-min is not below --particle-aabb-max");
     if (command.origin.size() == 3) origin_ = Vec3(command.origin.data());
     if (!origin_.allFinite()) throw InputError(Place{}, "--origin is not finite");
+    detail_ = detail_options(command);
+    temperature_ = told_temperature(command);
     if (command.particle_radius > 0) radius_ = Radius{command.particle_radius, "--particle-radius"};
     if (!command.terrain.empty()) {
       const importers::TerrainImport import = importers::import_terrain(command.terrain);
@@ -399,8 +437,11 @@ class Skinner {
     PointCloud cloud = importers::import_points(file, {.radius = command_.particle_radius == 0});
     for (const std::string& note : cloud.notes) tell_once(file, note);
     const std::size_t read = cloud.size();
+    const std::string anchor = detail_ ? anchor_detail(file, number.has_value(), cloud) : "";
     if (box_) crop(cloud, *box_);
-    for (Vec3& x : cloud.position) x -= origin_;
+    for (auto* at : {&cloud.position, &cloud.rest, &cloud.rest2})
+      for (Vec3& x : *at) x -= origin_;
+    if (detail_) choose_temperature(file, cloud);
     choose_radius(file, cloud);
     refuse_coarse_floats(file, cloud, outputs);
 
@@ -421,6 +462,7 @@ class Skinner {
     options.tessellation = command_.tessellation == "voronoi" ? skin::TessellationKind::kVoronoi : skin::TessellationKind::kLevelSet;
     options.coarsen = command_.coarsen;
     options.mesh = command_.check || std::any_of(outputs.begin(), outputs.end(), [](const fs::path& f) { return format_of(f) != Format::kVdb; });
+    options.detail = detail_;
     const bool meshed = options.mesh;
     skin::Skin skin;
     try {
@@ -431,6 +473,10 @@ class Skinner {
     const skin::LevelSet& surface = skin.surface;
     geometry::TriMesh& mesh = skin.mesh;
     if (!command_.sph_normals) geometry::compute_normals(mesh);
+    if (detail_) {
+      skin::color_lava(mesh);
+      if (cloud.temperature.empty()) mesh.attributes.erase("glow");  // nobody said how hot it is
+    }
     if (cloud.size() > 0) {
       j["radius"] = radius;
       j["radius_from"] = radius_->source;
@@ -446,6 +492,13 @@ class Skinner {
       j["thin_triangles_share"] = skin.report.shapes.thin;
       j["folded_triangles"] = skin.report.shapes.folded;
       if (skin.report.coarsened > 0) j["coarsen_error"] = skin.report.coarsen_error;
+    }
+    if (detail_) {
+      j["kind"] = command_.kind;
+      j["detail_on"] = anchor;
+      j["largest_displacement"] = skin.report.displace.largest;
+      j["held_back_vertices"] = skin.report.displace.held_back;
+      if (!skin.report.refined_enough) tell_once(file, "edges stay longer than --edge asks for: the mesh would have more than 20 million triangles");
     }
     const skin::LevelSetReport& report = surface.report();
     if (report.dropped_pieces + report.filled_bubbles > 0) {
@@ -491,6 +544,33 @@ class Skinner {
     if (std::find(told_.begin(), told_.end(), note) != told_.end()) return;
     told_.push_back(note);
     log_info(fmt::format("{}: {}", file.string(), note));
+  }
+
+  void warn_once(const fs::path& file, const std::string& note) {
+    if (std::find(told_.begin(), told_.end(), note) != told_.end()) return;
+    told_.push_back(note);
+    log_warning(fmt::format("{}: {}", file.string(), note));
+  }
+
+  /// What the detail hangs on: "rest" of the file, the first position of each "id", or the "world", which is told.
+  std::string anchor_detail(const fs::path& file, bool sequence, PointCloud& cloud) {
+    if (cloud.size() == 0 || !cloud.rest.empty()) return "rest";
+    if (sequence && first_.carry(cloud)) return "id";
+    warn_once(file, sequence            ? fmt::format("no rest and no ids that tell particles apart: --kind {} hangs its detail in space, and it will swim as they move", command_.kind)
+                    : cloud.id.empty()  ? fmt::format("no rest: --kind {} hangs its detail in space; over several frames it would swim", command_.kind)
+                                        : fmt::format("no rest: --kind {} hangs its detail in space; skinned in one call, the frames of a sequence would move it with their ids", command_.kind));
+    return "world";
+  }
+
+  /// Fills cloud.temperature by --temperature where the file has none.
+  void choose_temperature(const fs::path& file, PointCloud& cloud) {
+    if (cloud.size() == 0) return;
+    if (temperature_ && !cloud.temperature.empty()) tell_once(file, "has temperatures of its own: --temperature is not used");
+    if (temperature_ && cloud.temperature.empty()) cloud.temperature.assign(cloud.size(), *temperature_);
+    if (cloud.temperature.empty()) return;
+    const Real hottest = *std::max_element(cloud.temperature.begin(), cloud.temperature.end());
+    const Real draper = skin::LavaColorOptions().glow_from;
+    if (hottest <= draper) tell_once(file, fmt::format("the hottest particle has {:.4g} K: nothing glows below {:.0f} K", hottest, draper));
   }
 
   /// Fills cloud.radius and, with the first particles of all, radius_.
@@ -554,6 +634,9 @@ class Skinner {
   Vec3 origin_ = Vec3::Zero();
   std::optional<Radius> radius_;
   std::optional<geometry::Terrain> terrain_;
+  std::optional<skin::DisplaceOptions> detail_;  // nothing: smooth, without colour
+  std::optional<Real> temperature_;              // [K] of files that have none
+  FirstPositions first_;
   skin::SurfaceCache last_;  // of the frame before
   bool estimated_ = false;
   std::vector<std::string> told_;

@@ -34,6 +34,8 @@ const std::array<float, 2>& direction(std::int32_t i, std::int32_t j, std::uint3
   return kDirections[(h * 0x297a2d39u) >> 28];
 }
 
+constexpr float kPush = 0.2f;  // of an octave's wavelength, by which it moves the next
+
 std::int32_t floor_int(float x) {
   const std::int32_t i = static_cast<std::int32_t>(x);
   return i - (x < static_cast<float>(i) ? 1 : 0);
@@ -58,20 +60,24 @@ PlaneNoise plane_noise(float x, float y, std::uint32_t seed) {
 
 GroundLook ground_look(const Vec3f& p, const Vec3f& normal, float altitude, float footprint, float size) {
   // One octave: its value, and its slope added to the bumps; both fade between four and two pixels a wave. Each is
-  // turned by the angle of a 3-4-5 triangle more than the last, so that no lattice shows.
-  float bump_x = 0, bump_y = 0, cosine = 1, sine = 0;
+  // turned by the angle of a 3-4-5 triangle more than the last, and pushed about a little by the one before: else
+  // the lattice, whose nodes are zeros of the noise, shows as a waffle from close by.
+  float bump_x = 0, bump_y = 0, cosine = 1, sine = 0, push_x = 0, push_y = 0;
   const auto octave = [&](float wavelength, float slope, std::uint32_t seed) {
     std::tie(cosine, sine) = std::pair{0.8f * cosine - 0.6f * sine, 0.8f * sine + 0.6f * cosine};
     const float visible = saturate(wavelength / (2 * footprint) - 1);
     if (visible <= 0) return 0.0f;
-    const PlaneNoise noise = plane_noise((cosine * p.x() + sine * p.y()) / wavelength, (cosine * p.y() - sine * p.x()) / wavelength, seed);
+    const float x = p.x() + push_x, y = p.y() + push_y;
+    const PlaneNoise noise = plane_noise((cosine * x + sine * y) / wavelength, (cosine * y - sine * x) / wavelength, seed);
+    push_x = kPush * wavelength * visible * noise.value * cosine;
+    push_y = kPush * wavelength * visible * noise.value * sine;
     bump_x += visible * slope * (cosine * noise.dx - sine * noise.dy);
     bump_y += visible * slope * (sine * noise.dx + cosine * noise.dy);
     return visible * noise.value;
   };
   const float wide = octave(0.2f * size, 0, 1), patch = octave(67, 0.015f, 2), knoll = octave(23, 0.035f, 3),
               tuft = octave(8.3f, 0.055f, 4), stone = octave(3.1f, 0.075f, 5), grain = octave(1.15f, 0.11f, 6),
-              dust = octave(0.41f, 0.13f, 7);
+              dust = octave(0.41f, 0.13f, 7), crumb = octave(0.15f, 0.15f, 8), speck = octave(0.055f, 0.15f, 9);
 
   // How much of each: gentle ground carries soil, steep ground none.
   const float level = normal.z() + 0.05f * tuft + 0.04f * knoll;
@@ -86,7 +92,7 @@ GroundLook ground_look(const Vec3f& p, const Vec3f& normal, float altitude, floa
   const Vec3f cliff = stone_gray * (0.72f + 0.35f * strata + 0.35f * stone);
   Vec3f albedo = grass * meadow + scree * gravel * (1 + 0.35f * stone) + rock * cliff;
   albedo = mix(albedo, scoria * (1 + 0.3f * tuft), smooth(0.5f, 1.0f, altitude + 0.22f * knoll + 0.2f * patch) * (0.75f - 0.45f * grass));
-  albedo *= std::max(0.3f, 1 + 0.30f * grain + 0.25f * dust + 0.12f * stone);
+  albedo *= std::max(0.3f, 1 + 0.30f * grain + 0.25f * dust + 0.25f * crumb + 0.25f * speck + 0.12f * stone);
 
   const float rough = 0.75f + 0.5f * (rock + scree);
   const Vec3f bumped = (normal - rough * Vec3f(bump_x, bump_y, 0)).normalized();

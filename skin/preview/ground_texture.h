@@ -11,7 +11,7 @@ struct GroundLook {
 };
 
 /// Grass and scrub where it is gentle, scree, rock where it is steep, scoria near the top; patches and bumps of gradient
-/// noise from a fifth of the scene down to a third of a metre, each octave fading out before it is finer than a pixel.
+/// noise from a fifth of the scene down to half a decimetre, each octave fading out before it is finer than a pixel.
 ///   p          position [m]
 ///   normal     smooth, unit
 ///   altitude   0 lowest .. 1 highest

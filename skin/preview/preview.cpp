@@ -28,6 +28,8 @@ namespace {
 
 constexpr unsigned kGroundId = 0, kLavaId = 1;
 constexpr int kPacket = 8;
+constexpr float kMoltenGloss = 0.5f;
+constexpr float kShadowLift = 0.1f;  // [terrain edges] what is lower casts no shadow of the ground's
 constexpr float kFar = std::numeric_limits<float>::infinity();
 
 struct ReleaseDevice {
@@ -135,6 +137,7 @@ std::vector<float> sky_visibility(RTCScene scene, const Ground& ground) {
 /// The lava of one picture, in the ground's frame.
 struct Lava {
   std::vector<Vec3f> positions, normals, reflected, glow;
+  std::vector<float> fresh;  // 0 cold or crusted .. 1 molten film
   std::span<const geometry::Triangle> triangles;
 };
 
@@ -151,9 +154,16 @@ Lava take_lava(const TriMesh& mesh, const Vec3& origin) {
   const geometry::VertexAttribute* color = find_color(mesh);
   const auto found = mesh.attributes.find("glow");
   const geometry::VertexAttribute* glow = found != mesh.attributes.end() && found->second.width == 3 ? &found->second : nullptr;
+  const auto scalar = [&](const char* name) -> const std::vector<float>* {
+    const auto at = mesh.attributes.find(name);
+    return at != mesh.attributes.end() && at->second.width == 1 ? &at->second.values : nullptr;
+  };
+  const std::vector<float>*temperature = scalar("temperature"), *crust = scalar("crust");
+  lava.fresh.assign(n, 0.0f);
   parallel_for(n, [&](std::size_t i) {
     lava.positions[i] = (mesh.positions[i] - origin).cast<float>();
     lava.normals[i] = normals[i].cast<float>();
+    if (temperature) lava.fresh[i] = smooth(1000, 1300, (*temperature)[i]) * (crust ? 1 - saturate((*crust)[i]) : 1);
     if (glow) lava.glow[i] = Vec3f(glow->values[3 * i], glow->values[3 * i + 1], glow->values[3 * i + 2]).cwiseMax(0);
     if (color) {
       // The display colour holds the emission too: off with it.
@@ -169,7 +179,7 @@ struct Surface {
   bool hit = false, is_lava = false;
   Vec3f position, normal, albedo, emission;
   Vec3f geometric;  ///< the triangle's normal, towards the viewer
-  float distance = 0, sky = 1;
+  float distance = 0, sky = 1, gloss = 0;
 };
 
 /// Rays of the picture: where sample s of pixel (x, y) goes.
@@ -228,6 +238,7 @@ void require_sane(const PreviewOptions& o) {
                                     {"bloom", o.bloom},
                                     {"glow_light", o.glow_light}})
     if (!(value >= 0 && value <= 1e6)) fail(fmt::format("{} is {}, wanted 0 or more", name, value));
+  if (!(o.gloss >= 0 && o.gloss <= 1)) fail(fmt::format("gloss is {}, wanted 0 to 1", o.gloss));
 }
 
 }  // namespace
@@ -271,6 +282,7 @@ struct Picture {
       s.normal = at_hit(lava.normals, t, u, v);
       s.albedo = at_hit(lava.reflected, t, u, v);
       s.emission = at_hit(lava.glow, t, u, v);
+      s.gloss = std::max(static_cast<float>(options.gloss), kMoltenGloss * at_hit(lava.fresh, t, u, v));
       s.normal = s.normal.squaredNorm() > 1e-8f ? s.normal.normalized() : s.geometric;
       if (geometric.dot(d) > 0) s.normal = -s.normal;  // seen from behind
     } else {
@@ -297,16 +309,18 @@ struct Picture {
     if (lit) light += s.albedo.cwiseProduct(sky.sun_light()) * (facing / static_cast<float>(kPi));
     if (!glow_field.empty()) light += static_cast<float>(options.glow_light) * s.albedo.cwiseProduct(glow_field(s.position, s.normal));
     if (s.is_lava) {
-      // Glassy sheen: a rough highlight of the sun and a dull mirror of the sky (Schlick's Fresnel, 4 % head on).
-      const float grazing = 1 - saturate(-s.normal.dot(d)), g2 = grazing * grazing, fresnel = 0.04f + 0.5f * g2 * g2 * grazing;
+      // Sheen: a highlight of the sun and a dull mirror of the sky. Fresnel's rise at a grazing view is that of facets which face
+      // the viewer, and rubble has few that still do (Lagarde's form of Schlick's); what it mirrors is blurred over the sky.
+      const float grazing = 1 - saturate(-s.normal.dot(d)), g2 = grazing * grazing, fresnel = 0.04f + 0.5f * s.gloss * g2 * g2 * grazing;
       const Vec3f mirrored = d - 2 * d.dot(s.normal) * s.normal;
       if (lit) {
         const Vec3f half = (to_sun - d).normalized();
-        const float h = std::max(0.0f, s.normal.dot(half)), alpha2 = 0.3f * 0.3f, q = h * h * (alpha2 - 1) + 1;
+        const float h = std::max(0.0f, s.normal.dot(half)), alpha = mix(0.7f, 0.3f, s.gloss), alpha2 = alpha * alpha, q = h * h * (alpha2 - 1) + 1;
         const float lobe = alpha2 / (static_cast<float>(kPi) * q * q);
         light += sky.sun_light() * (0.25f * 0.04f * lobe * facing);
       }
-      light += (0.3f * fresnel * saturate(0.4f + mirrored.z())) * sky.radiance(mirrored);
+      const Vec3f reflection = mix(sky.ambient(s.normal), sky.radiance(mirrored), s.gloss);
+      light += (0.3f * fresnel * saturate(0.4f + mirrored.z())) * reflection;
       light += s.emission;
     }
     // Air between.
@@ -355,7 +369,8 @@ struct Picture {
         const Vec3f from = s.position + lift * s.geometric;
         // A low sun on coarse triangles with smooth normals: the triangles next to the point may not shade it, or every
         // edge would show along the shadow's border.
-        set_ray(ground_shadow, k, from, sun_sample(first + k, x0, y), s.is_lava ? lift : 1.2f * ground.edge, kFar);
+        const Vec3f above = from + Vec3f(0, 0, kShadowLift * ground.edge);
+        set_ray(ground_shadow, k, above, sun_sample(first + k, x0, y), s.is_lava ? lift : 1.2f * ground.edge, kFar);
         set_ray(lava_shadow, k, from, sun_sample(first + k, x0, y), lift, kFar);
       }
       rtcOccluded8(to_ground, ground_scene, &context, &ground_shadow);

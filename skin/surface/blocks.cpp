@@ -10,6 +10,12 @@
 namespace effuse::skin {
 
 namespace {
+/// What pack() was given.
+BlockCoord unpack(std::uint64_t key) {
+  const auto part = [&](int shift) { return static_cast<int>((key >> shift) & ((1u << 21) - 1)) - (1 << 20); };
+  return {part(42), part(21), part(0)};
+}
+
 /// The voxel at or below p in each coordinate, and how far p lies beyond it.
 struct Cell {
   int i, j, k;
@@ -24,18 +30,56 @@ struct Cell {
 };
 }  // namespace
 
-Blocks::Blocks(std::vector<BlockCoord> coords) : coords_(std::move(coords)) {
-  std::sort(coords_.begin(), coords_.end());
-  for (const BlockCoord& c : coords_) table_.number(pack(c[0], c[1], c[2]));
-  CHECK_EQ(table_.size(), coords_.size());
-  around_.resize(coords_.size());
-  parallel_for(coords_.size(), [&](std::size_t b) {
-    const BlockCoord& c = coords_[b];
-    for (int dx = -1; dx <= 1; ++dx)
-      for (int dy = -1; dy <= 1; ++dy)
-        for (int dz = -1; dz <= 1; ++dz)
-          around_[b][static_cast<std::size_t>((dx + 1) * 9 + (dy + 1) * 3 + dz + 1)] = find(c[0] + dx, c[1] + dy, c[2] + dz);
+Blocks::Blocks(const std::vector<BlockCoord>& coords) {
+  const auto data = std::make_shared<Data>();
+  const std::size_t n = coords.size();
+  // Packed coordinates have the order of the coordinates.
+  std::vector<std::uint64_t> key(n);
+  for (std::size_t b = 0; b < n; ++b) key[b] = pack(coords[b][0], coords[b][1], coords[b][2]);
+  std::sort(key.begin(), key.end());
+  data->coords.resize(n);
+  for (std::size_t b = 0; b < n; ++b) {
+    data->coords[b] = unpack(key[b]);
+    data->table.number(key[b]);
+  }
+  CHECK_EQ(data->table.size(), n);
+
+  // Blocks beside a row of blocks along z are rows, too: one place in each of the nine goes up with the blocks.
+  data->around.resize(n);
+  parallel_ranges(n, 1024, [&](std::size_t begin, std::size_t end) {
+    std::array<std::size_t, 9> at;
+    for (std::size_t row = 0; row < 9; ++row) {
+      const BlockCoord& c = data->coords[begin];
+      const std::uint64_t lowest = pack(c[0] + static_cast<int>(row / 3) - 1, c[1] + static_cast<int>(row % 3) - 1, c[2] - 1);
+      at[row] = static_cast<std::size_t>(std::lower_bound(key.begin(), key.end(), lowest) - key.begin());
+    }
+    for (std::size_t b = begin; b < end; ++b) {
+      const BlockCoord& c = data->coords[b];
+      std::array<Index, 27>& around = data->around[b];
+      for (std::size_t row = 0; row < 9; ++row) {
+        const std::uint64_t lowest = pack(c[0] + static_cast<int>(row / 3) - 1, c[1] + static_cast<int>(row % 3) - 1, c[2] - 1);
+        while (at[row] < n && key[at[row]] < lowest) ++at[row];
+        std::size_t next = at[row];
+        for (std::size_t dz = 0; dz < 3; ++dz) {
+          const bool there = next < n && key[next] == lowest + dz;
+          around[row * 3 + dz] = there ? static_cast<Index>(next++) : kNone;
+        }
+      }
+    }
   });
+  data_ = data;
+}
+
+std::vector<Index> same_places(const Blocks& blocks, const Blocks& others) {
+  std::vector<Index> same(blocks.size(), kNone);
+  const std::vector<BlockCoord>& there = others.coords();
+  Index other = 0;
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    const BlockCoord& c = blocks.coords()[b];
+    while (other < there.size() && there[other] < c) ++other;
+    if (other < there.size() && there[other] == c) same[b] = other;
+  }
+  return same;
 }
 
 Index Blocks::block_at(const Vec3& p) const {
@@ -72,7 +116,7 @@ Vec3 Blocks::gradient(std::span<const float> field, float outside, Index home, c
 }
 
 void Blocks::padded(std::span<const float> field, float outside, std::size_t b, float* out) const {
-  const std::array<Index, 27>& near = around_[b];
+  const std::array<Index, 27>& near = around(b);
   for (int i = -1; i <= kSide; ++i) {
     const int a = i < 0 ? 0 : i < kSide ? 1 : 2;
     for (int j = -1; j <= kSide; ++j) {

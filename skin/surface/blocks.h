@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -19,16 +20,19 @@ using Field = std::vector<float>;
 
 inline std::size_t voxel_index(int i, int j, int k) { return static_cast<std::size_t>((i << 6) | (j << 3) | k); }
 
+/// Never changes once made: copies are the same object, and cost nothing.
 class Blocks {
  public:
-  Blocks() = default;
+  Blocks() : data_(std::make_shared<const Data>()) {}
   /// coords: each once; sorted here.
-  explicit Blocks(std::vector<BlockCoord> coords);
+  explicit Blocks(const std::vector<BlockCoord>& coords);
+  Blocks(const Blocks&) = default;  // and no moves: a Blocks without data is none
+  Blocks& operator=(const Blocks&) = default;
 
-  std::size_t size() const { return coords_.size(); }
-  const std::vector<BlockCoord>& coords() const { return coords_; }
+  std::size_t size() const { return data_->coords.size(); }
+  const std::vector<BlockCoord>& coords() const { return data_->coords; }
   /// Blocks around block b, itself in the middle (13), by (dx+1)*9 + (dy+1)*3 + dz+1; kNone: there is none.
-  const std::array<Index, 27>& around(std::size_t b) const { return around_[b]; }
+  const std::array<Index, 27>& around(std::size_t b) const { return data_->around[b]; }
 
   /// Value at a voxel, `outside` where there is no block. home: a block believed near.
   float at(std::span<const float> field, float outside, Index home, int i, int j, int k) const {
@@ -48,18 +52,24 @@ class Blocks {
  private:
   Index block_of(Index home, int a, int b, int c) const {
     if (home != kNone) {
-      const BlockCoord& h = coords_[home];
+      const BlockCoord& h = data_->coords[home];
       const int da = a - h[0] + 1, db = b - h[1] + 1, dc = c - h[2] + 1;
       if (static_cast<unsigned>(da) < 3 && static_cast<unsigned>(db) < 3 && static_cast<unsigned>(dc) < 3)
-        return around_[home][static_cast<std::size_t>(da * 9 + db * 3 + dc)];
+        return data_->around[home][static_cast<std::size_t>(da * 9 + db * 3 + dc)];
     }
     return find(a, b, c);
   }
-  Index find(int a, int b, int c) const { return table_.find(pack(a, b, c)); }
+  Index find(int a, int b, int c) const { return data_->table.find(pack(a, b, c)); }
 
-  std::vector<BlockCoord> coords_;
-  std::vector<std::array<Index, 27>> around_;
-  KeyTable table_;
+  struct Data {
+    std::vector<BlockCoord> coords;
+    std::vector<std::array<Index, 27>> around;
+    KeyTable table;
+  };
+  std::shared_ptr<const Data> data_;
 };
+
+/// Of each block of `blocks`, the one at the same place in `others`; kNone: there is none.
+std::vector<Index> same_places(const Blocks& blocks, const Blocks& others);
 
 }  // namespace effuse::skin

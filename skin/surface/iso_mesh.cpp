@@ -8,6 +8,7 @@
 #include "geometry/base/parallel.h"
 #include "geometry/base/zones.h"
 #include "skin/surface/dual_cells.h"
+#include "skin/surface/surface_cache.h"
 
 namespace effuse::skin {
 
@@ -126,7 +127,7 @@ void mesh_cells(const Padded& p, MeshedBlock& out) {
           constexpr float kAgree = 0.3f;
           if (!(normal.dot(way) > kAgree * normal.norm() * way.norm())) normal = way;
           out.position.push_back(Eigen::Vector3f(static_cast<float>(i), static_cast<float>(j), static_cast<float>(k)) + x);
-          out.normal.push_back(normal.normalized());
+          out.normal.push_back(normal.normalized().cast<Real>().normalized());
         }
       }
 }
@@ -135,6 +136,10 @@ void mesh_cells(const Padded& p, MeshedBlock& out) {
 void mesh_edges(const Blocks& blocks, std::size_t b, std::vector<MeshedBlock>& meshed) {
   MeshedBlock& out = meshed[b];
   const std::array<Index, 27>& around = blocks.around(b);
+  struct Corner {
+    std::uint8_t block;
+    std::uint16_t vertex;
+  };
   // The vertex of cell (i, j, k), -1 .. 7, on its edge e.
   const auto corner = [&](int i, int j, int k, unsigned e) {
     const std::size_t slot = static_cast<std::size_t>(((i >> 3) + 1) * 9 + ((j >> 3) + 1) * 3 + (k >> 3) + 1);
@@ -142,7 +147,7 @@ void mesh_edges(const Blocks& blocks, std::size_t b, std::vector<MeshedBlock>& m
     const std::size_t cell = voxel_index(i & 7, j & 7, k & 7);
     const unsigned configuration = of.configuration[cell], joined = of.joined[cell];
     const std::uint8_t patch = joined == 0 ? kDualCells[configuration].patch[e] : dual_cell(configuration, joined).patch[e];
-    return MeshedBlock::Corner{static_cast<std::uint8_t>(slot), static_cast<std::uint16_t>(of.first[cell] + patch)};
+    return Corner{static_cast<std::uint8_t>(slot), static_cast<std::uint16_t>(of.first[cell] + patch)};
   };
   for (int i = 0; i < kSide; ++i)
     for (int j = 0; j < kSide; ++j)
@@ -150,9 +155,9 @@ void mesh_edges(const Blocks& blocks, std::size_t b, std::vector<MeshedBlock>& m
         const unsigned configuration = out.configuration[voxel_index(i, j, k)];
         if (configuration == 0 || configuration == 255) continue;
         const bool inside = configuration & 1u;
-        const auto quad = [&](const MeshedBlock::Corner& a, const MeshedBlock::Corner& c1, const MeshedBlock::Corner& c, const MeshedBlock::Corner& c3) {
-          if (inside) out.quads.push_back({a, c1, c, c3});
-          else out.quads.push_back({a, c3, c, c1});
+        const auto quad = [&](const Corner& a, Corner b1, const Corner& c, Corner d) {
+          if (!inside) std::swap(b1, d);
+          out.quads.push_back({{a.block, b1.block, c.block, d.block}, {a.vertex, b1.vertex, c.vertex, d.vertex}, false});
         };
         // Counter-clockwise about the axis; the cell's own offsets from the edge say which of its four it is.
         if (inside != ((configuration >> 4) & 1u))
@@ -198,7 +203,7 @@ bool widen(const Blocks& blocks, float outside, const Field& phi, const std::vec
   std::sort(coords.begin(), coords.end());
   coords.erase(std::unique(coords.begin(), coords.end()), coords.end());
   coords.insert(coords.end(), blocks.coords().begin(), blocks.coords().end());
-  wider = Blocks(std::move(coords));
+  wider = Blocks(coords);
   values.assign(wider.size() * kVoxels, outside);
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     const BlockCoord& c = blocks.coords()[b];
@@ -210,27 +215,16 @@ bool widen(const Blocks& blocks, float outside, const Field& phi, const std::vec
 
 /// Where each block whose mesh is still good lies in `last`; kNone: to be made. edges: whose quads are to be made.
 std::vector<Index> still_good(const Blocks& blocks, float outside, const MeshCache& last, std::span<const Index> unchanged, std::vector<std::uint8_t>& edges) {
-  std::vector<Index> good(blocks.size(), kNone);
-  edges.assign(blocks.size(), 1);
-  if (unchanged.empty() || last.meshed.empty() || last.outside != outside) return good;
-  parallel_for(
-      blocks.size(),
-      [&](std::size_t b) {
-        if (unchanged[b] == kNone) return;
-        for (std::size_t slot = 0; slot < 27; ++slot) {
-          const Index now = blocks.around(b)[slot], then = last.blocks.around(unchanged[b])[slot];
-          if (now == kNone ? then != kNone : unchanged[now] == kNone) return;
-        }
-        good[b] = unchanged[b];
-      },
-      256);
-  parallel_for(
-      blocks.size(),
-      [&](std::size_t b) {
-        const auto& around = blocks.around(b);
-        edges[b] = std::any_of(around.begin(), around.end(), [&](Index k) { return k != kNone && good[k] == kNone; });
-      },
-      256);
+  if (unchanged.empty() || last.meshed.empty() || last.outside != outside) return std::vector<Index>(blocks.size(), kNone);
+  // Values of a block or of one beside it have changed, or one beside it is gone.
+  std::vector<std::uint8_t> changed(blocks.size());
+  for (std::size_t b = 0; b < blocks.size(); ++b) changed[b] = unchanged[b] == kNone;
+  changed = widened(blocks, std::move(changed), 1);
+  mark_beside_gone(last.blocks, same_places(last.blocks, blocks), changed);
+  std::vector<Index> good(unchanged.begin(), unchanged.end());
+  for (std::size_t b = 0; b < blocks.size(); ++b)
+    if (changed[b]) good[b] = kNone;
+  edges = widened(blocks, std::move(changed), 1);
   return good;
 }
 
@@ -275,6 +269,7 @@ geometry::TriMesh iso_mesh(const Blocks& blocks, float outside, const Field& phi
   parallel_for(
       blocks.size(), [&](std::size_t b) { if (edges[b] && !meshed[b].empty()) mesh_edges(blocks, b, meshed); }, 16);
 
+  ZONE("skin.assemble");
   std::vector<Index> vertices(blocks.size() + 1, 0), quads(blocks.size() + 1, 0);
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     vertices[b + 1] = vertices[b] + static_cast<Index>(meshed[b].position.size());
@@ -289,23 +284,27 @@ geometry::TriMesh iso_mesh(const Blocks& blocks, float outside, const Field& phi
       [&](std::size_t b) {
         const BlockCoord& c = blocks.coords()[b];
         const Vec3 low(kSide * c[0], kSide * c[1], kSide * c[2]);
-        for (std::size_t v = 0; v < meshed[b].position.size(); ++v) {
-          mesh.positions[vertices[b] + v] = low + meshed[b].position[v].cast<Real>();
-          mesh.normals[vertices[b] + v] = meshed[b].normal[v].cast<Real>().normalized();
-        }
+        for (std::size_t v = 0; v < meshed[b].position.size(); ++v) mesh.positions[vertices[b] + v] = low + meshed[b].position[v].cast<Real>();
+        std::copy(meshed[b].normal.begin(), meshed[b].normal.end(), mesh.normals.begin() + vertices[b]);
       },
       64);
   parallel_for(
       blocks.size(),
       [&](std::size_t b) {
+        if (meshed[b].quads.empty()) return;
+        std::array<Index, 27> first;  // vertices of the blocks around
+        for (std::size_t slot = 0; slot < 27; ++slot) {
+          const Index other = blocks.around(b)[slot];
+          first[slot] = other == kNone ? kNone : vertices[other];
+        }
         geometry::Triangle* out = mesh.triangles.data() + 2 * static_cast<std::size_t>(quads[b]);
-        for (const std::array<MeshedBlock::Corner, 4>& quad : meshed[b].quads) {
+        for (MeshedBlock::Quad& quad : meshed[b].quads) {
           Index q[4];
-          for (std::size_t k = 0; k < 4; ++k) q[k] = vertices[blocks.around(b)[quad[k].block]] + quad[k].vertex;
+          for (std::size_t k = 0; k < 4; ++k) q[k] = first[quad.block[k]] + quad.vertex[k];
           const auto& p = mesh.positions;
-          const bool along = (p[q[0]] - p[q[2]]).squaredNorm() <= (p[q[1]] - p[q[3]]).squaredNorm();
-          *out++ = along ? geometry::Triangle{q[0], q[1], q[2]} : geometry::Triangle{q[0], q[1], q[3]};
-          *out++ = along ? geometry::Triangle{q[0], q[2], q[3]} : geometry::Triangle{q[1], q[2], q[3]};
+          if (edges[b]) quad.along = (p[q[0]] - p[q[2]]).squaredNorm() <= (p[q[1]] - p[q[3]]).squaredNorm();
+          *out++ = quad.along ? geometry::Triangle{q[0], q[1], q[2]} : geometry::Triangle{q[0], q[1], q[3]};
+          *out++ = quad.along ? geometry::Triangle{q[0], q[2], q[3]} : geometry::Triangle{q[1], q[2], q[3]};
         }
       },
       64);

@@ -15,13 +15,15 @@ namespace effuse::skin {
 struct MeshedBlock {
   std::vector<std::uint8_t> configuration, joined;  // of each cell (dual_cells.h)
   std::vector<std::uint16_t> first;                 // vertex of each cell's first patch
-  std::vector<Eigen::Vector3f> position, normal;    // of the vertices, from the block's voxel (0, 0, 0)
-  /// A vertex of a block nearby: 0..26 as Blocks::around, and which there.
-  struct Corner {
-    std::uint8_t block;
-    std::uint16_t vertex;
+  std::vector<Eigen::Vector3f> position;            // of the vertices, from the block's voxel (0, 0, 0)
+  std::vector<Vec3> normal;
+  /// Counter-clockwise from outside. A corner: a vertex of a block nearby, 0..26 as Blocks::around, and which there.
+  struct Quad {
+    std::array<std::uint8_t, 4> block;
+    std::array<std::uint16_t, 4> vertex;
+    bool along;  // split from the first corner to the third
   };
-  std::vector<std::array<Corner, 4>> quads;  // counter-clockwise from outside
+  std::vector<Quad> quads;
   bool empty() const { return position.empty(); }
 };
 

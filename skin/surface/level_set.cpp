@@ -17,6 +17,9 @@ LevelSet::LevelSet() : impl_(std::make_unique<Impl>()) {}
 LevelSet::~LevelSet() = default;
 LevelSet::LevelSet(LevelSet&&) noexcept = default;
 LevelSet& LevelSet::operator=(LevelSet&&) noexcept = default;
+LevelSet::Impl::~Impl() {
+  if (home) home->give_back(frame, std::move(phi));
+}
 
 bool LevelSet::empty() const { return impl_->blocks.size() == 0; }
 Real LevelSet::voxel() const { return impl_->voxel; }
@@ -36,6 +39,9 @@ struct Making {
   float lone = 0, sheet = 0;  // W at the surface of a lone particle, of a plane sheet
   float sink = 0;
   const geometry::Terrain* terrain = nullptr;
+  Real volume = 0;      // to be enclosed; 0: as it comes
+  float most_shift = 0;
+  Real least = 0;       // smaller pieces are dropped
   float depth() const { return sink + 2; }  // voxels deeper than this are outside, whatever they were
 };
 
@@ -54,8 +60,16 @@ Field make_field(const LevelSet::Impl& s, const Blocks& blocks, const Making& ma
   return lifted;
 }
 
-/// The same on all blocks, from the last frame where nothing has changed. stale: out, the blocks that were made anew.
-Field renew_field(const LevelSet::Impl& s, const Making& making, SurfaceCache::Impl& last, const std::vector<std::uint64_t>& hash, GroundField& ground, Renewal& renewal) {
+/// The same on all blocks of s, into the cache.
+void fill_all(const LevelSet::Impl& s, const Making& making, SurfaceCache::Impl& cache) {
+  GroundField ground;
+  cache.lifted = make_field(s, s.blocks, making, ground);
+  cache.distance = std::move(ground.distance);
+  cache.above = std::move(ground.above);
+}
+
+/// The same on all blocks of s, in last.lifted: what is there is kept where nothing has changed. Returns what was made anew.
+Renewal renew_field(const LevelSet::Impl& s, const Making& making, SurfaceCache::Impl& last, const std::vector<std::uint64_t>& hash, const HashSet& hashes) {
   // How far a value feels a particle, what it needs of the values around it (a voxel a step, the lift), and whether it depends on
   // what the blocks beside its own hold (sums at nodes; being deep inside).
   const int steps = smoothing_steps(making.smoothing);
@@ -63,7 +77,7 @@ Field renew_field(const LevelSet::Impl& s, const Making& making, SurfaceCache::I
   const bool round = making.kernel == SurfaceKernel::kRound, blocks_beside = !round || making.raster.reach >= kFineReach;
   const Real felt = round ? static_cast<Real>(s.reach) + (blocks_beside ? 4 : 0)
                           : std::max<Real>(kernel_influence(making.raster.spacing, s.reach), kSide + static_cast<Real>(making.raster.spacing));
-  renewal = find_stale(last, s.particles, hash, s.blocks, felt + static_cast<Real>(beyond));
+  Renewal renewal = find_stale(last, s.particles, hash, hashes, s.blocks, felt + static_cast<Real>(beyond));
   const std::vector<std::uint8_t> needed = widened(s.blocks, renewal.stale, static_cast<int>(std::ceil(beyond / kSide)) + (blocks_beside ? 1 : 0));
   std::vector<BlockCoord> coords;
   for (std::size_t b = 0; b < s.blocks.size(); ++b)
@@ -71,27 +85,26 @@ Field renew_field(const LevelSet::Impl& s, const Making& making, SurfaceCache::I
   if (coords.size() > s.blocks.size() * 2 / 3) {
     std::fill(renewal.stale.begin(), renewal.stale.end(), std::uint8_t{1});
     renewal.stale_blocks = s.blocks.size();
-    return make_field(s, s.blocks, making, ground);
+    fill_all(s, making, last);
+    return renewal;
   }
-  const Blocks part(std::move(coords));
+  const Blocks part(coords);
   GroundField part_ground;
   const Field made = make_field(s, part, making, part_ground);
 
-  Field field(s.blocks.size() * kVoxels);
-  if (making.terrain) ground.distance.resize(field.size()), ground.above.resize(field.size());
-  parallel_for(
-      s.blocks.size(),
-      [&](std::size_t b) {
-        const BlockCoord& c = s.blocks.coords()[b];
-        const std::size_t from = kVoxels * (renewal.stale[b] ? part.block_at(Vec3(kSide * c[0], kSide * c[1], kSide * c[2])) : renewal.before[b]);
-        const auto take = [&](const Field& anew, const Field& old, Field& to) { std::copy_n(&(renewal.stale[b] ? anew : old)[from], kVoxels, &to[b * kVoxels]); };
-        take(made, last.lifted, field);
-        if (!making.terrain) return;
-        take(part_ground.distance, last.distance, ground.distance);
-        take(part_ground.above, last.above, ground.above);
-      },
-      64);
-  return field;
+  ZONE("skin.keep");
+  const std::vector<Index> from = same_places(s.blocks, part);
+  const auto keep = [&](Field& kept, const Field& anew) {
+    rearrange(kept, renewal.before);
+    parallel_for(
+        s.blocks.size(), [&](std::size_t b) { if (renewal.stale[b]) std::copy_n(&anew[kVoxels * from[b]], kVoxels, &kept[kVoxels * b]); }, 64);
+  };
+  keep(last.lifted, made);
+  if (making.terrain) {
+    keep(last.distance, part_ground.distance);
+    keep(last.above, part_ground.above);
+  }
+  return renewal;
 }
 
 /// Whether values of the last frame can be used at all.
@@ -99,6 +112,124 @@ bool fits(const SurfaceCache::Impl& last, const LevelSetOptions& o, const geomet
   const LevelSetOptions& p = last.options;
   return last.filled && last.terrain == terrain && last.origin == origin && p.spacing == o.spacing && p.voxel == o.voxel && p.influence == o.influence && p.kernel == o.kernel &&
          p.radius == o.radius && p.smoothing == o.smoothing && p.sink == o.sink;
+}
+
+/// The shift at which the volume asked for is enclosed; it is not made yet, but `outside` has moved. phi, above: of all blocks.
+Shift match(LevelSet::Impl& s, const Making& making, const Field& phi, const Field& above, KnownVolumes& known) {
+  Shift shift;
+  if (!(making.volume > 0)) return shift;
+  shift = matching_shift(s.blocks, s.outside, phi, above, making.volume, making.most_shift, known);
+  s.report.shift = static_cast<Real>(shift.voxels()) * s.voxel;
+  s.outside -= shift.voxels();
+  return shift;
+}
+
+/// to[i] = value[i], shifted, and ended under the ground, for voxels of block b. distance: of all blocks, or empty; may be the same field.
+void finish(const LevelSet::Impl& s, const Making& making, const Shift& shift, const Field& value, const Field& distance, std::size_t b, Field& to) {
+  const float by = shift.voxels();
+  const std::size_t first = b * kVoxels;
+  if (!making.terrain) {
+    for (std::size_t i = first; i < first + kVoxels; ++i) to[i] = value[i] - by;
+    return;
+  }
+  for (std::size_t i = first; i < first + kVoxels; ++i)
+    to[i] = distance[i] < kNoGround ? std::min(s.outside, std::max(value[i] - by, -distance[i] - making.sink)) : value[i] - by;
+}
+
+/// Without ground, and where nothing was dropped, the volume is the one that the shift was found for.
+bool volume_is_known(const LevelSet::Impl& s, const Making& making, const Shift& shift) {
+  return shift.volume >= 0 && !making.terrain && s.report.dropped_webs + s.report.dropped_pieces + s.report.filled_bubbles == 0;
+}
+
+/// The level set on its blocks. Returns its volume [voxels].
+Real build(LevelSet::Impl& s, const Making& making) {
+  GroundField ground;
+  KnownVolumes known;
+  s.phi = make_field(s, s.blocks, making, ground);
+  const Shift shift = match(s, making, s.phi, ground.above, known);
+  parallel_for(
+      s.blocks.size(), [&](std::size_t b) { finish(s, making, shift, s.phi, ground.distance, b, s.phi); }, 32);
+  drop_pieces(s.blocks, s.particles, making.least, s.phi, s.report);
+  return volume_is_known(s, making, shift) ? shift.volume : enclosed(s.blocks, s.outside, s.phi, ground.above, 0);
+}
+
+/// The same, with what the frame before has left in the cache, to which this one's is left. fits: something of it can be used.
+Real build_cached(LevelSet::Impl& s, const Making& making, SurfaceCache::Impl& c, bool fits) {
+  std::vector<std::uint64_t> hash = particle_hashes(s.particles);
+  HashSet hashes(hash);
+  c.filled = false;  // until all of it is of one frame again
+  Renewal renewal;
+  KnownVolumes known;
+  std::vector<std::uint8_t> beside;  // blocks whose cells may have changed
+  if (fits) {
+    renewal = renew_field(s, making, c, hash, hashes);
+    s.report.renewed = renewal.stale_blocks;
+    // Cells reach into the next block; a block that is gone leaves `outside` behind.
+    beside = widened(s.blocks, renewal.stale, 1);
+    for (std::size_t b = 0; b < beside.size(); ++b) beside[b] |= renewal.bereft[b];
+    known.last = &c.volumes;
+    known.before = renewal.before;
+    known.stale = beside;
+    known.guess = c.shift;
+  } else {
+    fill_all(s, making, c);
+  }
+  const Shift shift = match(s, making, c.lifted, c.above, known);
+
+  // The last frame's surface, where it was handed out and is held by nobody any more, is that of this one but for blocks made anew and
+  // blocks of which pieces were dropped.
+  const bool same_shift = fits && c.shift == shift.steps;
+  if (same_shift) {
+    s.unchanged = renewal.before;
+    for (std::size_t b = 0; b < s.blocks.size(); ++b)
+      if (renewal.stale[b]) s.unchanged[b] = kNone;
+  }
+  {
+    ZONE("skin.shift");
+    std::pair<std::uint64_t, Field> returned = c.returned->take();
+    s.phi = std::move(returned.second);
+    const bool kept = same_shift && returned.first == c.frame && s.phi.size() == c.blocks.size() * kVoxels;
+    if (kept) rearrange(s.phi, renewal.before);
+    else s.phi.resize(c.lifted.size());
+    parallel_for(
+        s.blocks.size(),
+        [&](std::size_t b) {
+          if (!kept || s.unchanged[b] == kNone || c.touched[s.unchanged[b]]) finish(s, making, shift, c.lifted, c.distance, b, s.phi);
+        },
+        32);
+  }
+  std::vector<std::uint8_t> touched = drop_pieces(s.blocks, s.particles, making.least, s.phi, s.report, &c.pieces, s.unchanged);
+  for (std::size_t b = 0; b < s.unchanged.size(); ++b)
+    if (s.unchanged[b] != kNone && (touched[b] || c.touched[s.unchanged[b]])) s.unchanged[b] = kNone;
+
+  Real volume = shift.volume;
+  if (volume_is_known(s, making, shift)) {
+    c.final_volumes.clear();
+  } else {
+    KnownVolumes final;
+    if (!s.unchanged.empty()) {
+      for (std::size_t b = 0; b < s.blocks.size(); ++b) beside[b] = s.unchanged[b] == kNone;
+      beside = widened(s.blocks, std::move(beside), 1);
+      for (std::size_t b = 0; b < s.blocks.size(); ++b) beside[b] |= renewal.bereft[b];
+      final.last = &c.final_volumes;
+      final.before = renewal.before;
+      final.stale = beside;
+    }
+    volume = enclosed(s.blocks, s.outside, s.phi, c.above, final);
+    c.final_volumes = std::move(final.now);
+  }
+
+  s.frame = ++c.frame;
+  s.home = c.returned;
+  c.blocks = s.blocks;
+  c.x = s.particles.x();
+  c.hash = std::move(hash);
+  c.hashes = std::move(hashes);
+  c.volumes = std::move(known.now);
+  c.shift = shift.steps;
+  c.touched = std::move(touched);
+  c.filled = true;
+  return volume;
 }
 
 }  // namespace
@@ -141,97 +272,24 @@ LevelSet build_level_set(const geometry::Points& points, Real volume, const geom
                 .terrain = terrain};
   making.sheet = static_cast<float>(kPi) / 4 * (s.reach / d) * (s.reach / d) * making.lone * near_surface;
 
-  GroundField ground;
-  Renewal renewal;
-  std::vector<std::uint64_t> hash;
-  KnownVolumes known;
-  std::vector<std::uint8_t> beside, edge;  // blocks whose cells may have changed; those that lost a neighbour
-  if (last) hash = particle_hashes(s.particles);
-  if (last && fits(last->impl(), options, terrain, s.particles.origin())) {
-    s.phi = renew_field(s, making, last->impl(), hash, ground, renewal);
-    // Cells reach into the next block; a block that is gone leaves `outside` behind.
-    beside = widened(s.blocks, renewal.stale, 1);
-    edge.assign(s.blocks.size(), 0);
-    for (std::size_t b = 0; b < s.blocks.size(); ++b) {
-      for (std::size_t slot = 0; slot < 27 && !beside[b]; ++slot)
-        edge[b] = edge[b] || (s.blocks.around(b)[slot] == kNone && last->impl().blocks.around(renewal.before[b])[slot] != kNone);
-      beside[b] = beside[b] || edge[b];
-    }
-    known.last = &last->impl().volumes;
-    known.before = renewal.before;
-    known.stale = beside;
-  } else {
-    s.phi = make_field(s, s.blocks, making, ground);
-  }
-  s.report.blocks = s.blocks.size();
-  s.report.renewed = known.last ? renewal.stale_blocks : s.blocks.size();
-
-  Field lifted = std::move(s.phi);
   const Real voxels = std::pow(s.voxel, -3);
-  Shift shift{0, -1};
   if (options.match_volume && volume > 0) {
     s.report.target = volume;
-    shift = matching_shift(s.blocks, s.outside, lifted, ground.above, volume * voxels, d / 2, known);
-    s.report.shift = static_cast<Real>(shift.shift) * s.voxel;
-    s.outside -= shift.shift;
+    making.volume = volume * voxels;
+    making.most_shift = d / 2;
   }
-  s.phi.resize(lifted.size());
-  parallel_for(
-      s.phi.size(),
-      [&](std::size_t i) {
-        const float value = lifted[i] - shift.shift;
-        s.phi[i] = terrain && ground.distance[i] < kNoGround ? std::min(s.outside, std::max(value, -ground.distance[i] - sink)) : value;
-      },
-      1 << 14);
-
-  const Real least = options.drop_volume * std::pow(static_cast<Real>(d), 3);
+  making.least = options.drop_volume * std::pow(static_cast<Real>(d), 3);
+  s.report.blocks = s.report.renewed = s.blocks.size();
   if (last) {
     SurfaceCache::Impl& c = last->impl();
-    const bool same_shift = known.last && c.shift == shift.shift;
-    if (same_shift) {
-      s.unchanged = renewal.before;
-      for (std::size_t b = 0; b < s.blocks.size(); ++b)
-        if (renewal.stale[b]) s.unchanged[b] = kNone;
-    }
-    std::vector<std::uint8_t> touched = drop_pieces(s.blocks, s.particles, least, s.phi, s.report, &c.pieces, s.unchanged);
-    for (std::size_t b = 0; b < s.unchanged.size(); ++b)
-      if (s.unchanged[b] != kNone && (touched[b] || c.touched[s.unchanged[b]])) s.unchanged[b] = kNone;
-    s.frame = ++c.frame;
-    c.filled = true;
+    s.report.volume = build_cached(s, making, c, fits(c, options, terrain, s.particles.origin())) / voxels;
     c.options = options;
     c.terrain = terrain;
     c.origin = s.particles.origin();
-    c.blocks = s.blocks;
-    c.x = s.particles.x();
-    c.hash = std::move(hash);
-    c.lifted = std::move(lifted);
-    c.distance = std::move(ground.distance);
-    c.volumes = std::move(known.now);
-    c.shift = shift.shift;
-    c.touched = std::move(touched);
   } else {
-    drop_pieces(s.blocks, s.particles, least, s.phi, s.report);
-  }
-
-  // Without ground, and where nothing was dropped, it is the volume that the shift was found for.
-  if (shift.volume >= 0 && !terrain && s.report.dropped_webs + s.report.dropped_pieces + s.report.filled_bubbles == 0) {
-    s.report.volume = shift.volume / voxels;
-    if (last) last->impl().final_volumes.clear();
-  } else {
-    KnownVolumes final;
-    if (last && !s.unchanged.empty()) {
-      for (std::size_t b = 0; b < s.blocks.size(); ++b) beside[b] = s.unchanged[b] == kNone;
-      beside = widened(s.blocks, std::move(beside), 1);
-      for (std::size_t b = 0; b < s.blocks.size(); ++b) beside[b] = beside[b] || edge[b];
-      final.last = &last->impl().final_volumes;
-      final.before = renewal.before;
-      final.stale = beside;
-    }
-    s.report.volume = enclosed(s.blocks, s.outside, s.phi, ground.above, final) / voxels;
-    if (last) last->impl().final_volumes = std::move(final.now);
+    s.report.volume = build(s, making) / voxels;
   }
   if (s.report.target > 0) s.report.residual = s.report.volume / s.report.target - 1;
-  if (last) last->impl().above = std::move(ground.above);
   COUNT("skin.voxels", s.phi.size());
   return surface;
 }

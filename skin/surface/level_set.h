@@ -64,7 +64,8 @@ class LevelSet {
   std::unique_ptr<Impl> impl_;
 };
 
-/// What a frame's surface leaves for the next frame's. Opaque. A film goes through one, frame by frame.
+/// What a frame's surface leaves for the next frame's. Opaque. A film goes through one, frame by frame. It keeps a second field, and that of a
+/// level set made with it once that is gone: the next frame's is made in its place, sooner than where the level set is still held.
 class SurfaceCache {
  public:
   SurfaceCache();

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -14,7 +15,13 @@
 /// For the .cpp files of this folder: what a level set holds, and the steps of its making. Lengths in voxels unless [m].
 namespace effuse::skin {
 
+class ReturnedField;
+
 struct LevelSet::Impl {
+  Impl() = default;
+  ~Impl();  // gives the field back to the cache that it was made with
+  Impl(const Impl&) = delete;
+
   Real voxel = 1;        ///< [m]
   Real spacing = 1;      ///< [m]
   float reach = 4;       ///< of a particle
@@ -26,6 +33,7 @@ struct LevelSet::Impl {
   std::optional<geometry::Terrain> terrain;
   LevelSetReport report;
   std::uint64_t frame = 0;       ///< of its SurfaceCache; 0: made without one
+  std::shared_ptr<ReturnedField> home;  ///< of that cache
   std::vector<Index> unchanged;  ///< of each block with the values of one of the frame before: which; kNone. Empty: none has
 
   Vec3 world(const Vec3& p) const { return particles.origin() + voxel * p; }
@@ -58,6 +66,7 @@ struct KnownVolumes {
   const std::map<int, std::vector<Real>>* last = nullptr;
   std::span<const Index> before;         ///< of each block, among the last frame's
   std::span<const std::uint8_t> stale;   ///< or a cell of it reaches into a block that is
+  int guess = 0;                         ///< the last frame's shift, in steps: where to look first
   std::map<int, std::vector<Real>> now;
 };
 
@@ -66,13 +75,14 @@ struct KnownVolumes {
 Real enclosed(const Blocks& blocks, float outside, const Field& phi, const Field& above, float shift);
 /// At shift 0, blocks that are known taken from there.
 Real enclosed(const Blocks& blocks, float outside, const Field& phi, const Field& above, KnownVolumes& known);
-struct Shift {
-  float shift;  ///< [voxels]
-  Real volume;  ///< [voxels] enclosed by then
-};
-/// The shift within +-most, in steps of 1 / kShiftSteps, at which enclosed() is the target as nearly as such steps allow; the nearer
-/// end when there is none.
 inline constexpr int kShiftSteps = 128;
+struct Shift {
+  int steps = 0;     ///< of 1 / kShiftSteps voxels
+  Real volume = -1;  ///< [voxels] enclosed by then
+  float voxels() const { return static_cast<float>(steps) / kShiftSteps; }
+};
+/// The shift within +-most, in steps of 1 / kShiftSteps, at which enclosed() is the target as nearly as such steps allow (of two the
+/// smaller one); the nearer end when there is none. The same wherever one begins to look.
 Shift matching_shift(const Blocks& blocks, float outside, const Field& phi, const Field& above, Real target, float most, KnownVolumes& known);
 
 /// The face-connected sets of voxels on one side of the surface, within one block.

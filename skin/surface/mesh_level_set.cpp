@@ -10,11 +10,12 @@ namespace effuse::skin {
 
 namespace {
 
-void carry_attributes(const LevelSet::Impl& s, const std::vector<Vec3>& at, geometry::TriMesh& mesh) {
+/// mesh: its positions still in voxels.
+void carry_attributes(const LevelSet::Impl& s, geometry::TriMesh& mesh) {
   const ParticleGrid::Carried& carried = s.particles.carried();
   if (carried.width == 0) return;
-  const std::vector<float> values = carried_at(s, at);
-  const std::size_t n = at.size(), stride = static_cast<std::size_t>(carried.width);
+  const std::vector<float> values = carried_at(s, mesh.positions);
+  const std::size_t n = mesh.positions.size(), stride = static_cast<std::size_t>(carried.width);
   const auto take = [&](const char* name, int offset, int width) {
     if (offset < 0) return;
     geometry::VertexAttribute& attribute = mesh.attributes[name];
@@ -45,9 +46,9 @@ geometry::TriMesh mesh_level_set(const LevelSet& surface, SurfaceCache* last) {
   } else {
     mesh = iso_mesh(s.blocks, s.outside, s.phi);
   }
-  const std::vector<Vec3> at = mesh.positions;
-  for (Vec3& p : mesh.positions) p = s.world(p);
-  carry_attributes(s, at, mesh);
+  carry_attributes(s, mesh);
+  parallel_for(
+      mesh.positions.size(), [&](std::size_t v) { mesh.positions[v] = s.world(mesh.positions[v]); }, 4096);
   return mesh;
 }
 

@@ -8,6 +8,7 @@
 #include "geometry/base/check.h"
 #include "geometry/base/error.h"
 #include "geometry/base/parallel.h"
+#include "geometry/base/zones.h"
 #include "skin/surface/clones.h"
 
 namespace effuse::skin {
@@ -35,6 +36,7 @@ void check_input(const geometry::Points& points, Real voxel) {
 }  // namespace
 
 ParticleGrid::ParticleGrid(const geometry::Points& points, Real voxel, Real side) : side_(side) {
+  ZONE("skin.sort");
   check_input(points, voxel);
   const std::size_t n = points.size();
   if (n == 0) return;

@@ -53,9 +53,9 @@ EFFUSE_CLONES void corner_sums(float* v) {
 class Enclosed {
  public:
   Enclosed(const Blocks& blocks, float outside, const Field& phi, const Field& above)
-      : blocks_(blocks), outside_(outside), phi_(phi), above_(above), full_(blocks.size(), -1) {}
+      : blocks_(blocks), outside_(outside), phi_(phi), above_(above), range_(blocks.size(), {1, 0}), full_(blocks.size(), -1) {}
   Real operator()(float shift) {
-    find_ranges();
+    find_ranges([](std::size_t) { return true; });
     return parallel_sum(
         blocks_.size(), Real{0}, [&](std::size_t b) { return of_block(b, shift); }, 32);
   }
@@ -64,39 +64,47 @@ class Enclosed {
     const std::vector<Real>* last = nullptr;
     if (known.last)
       if (const auto at = known.last->find(steps); at != known.last->end()) last = &at->second;
+    const auto asked = [&](std::size_t b) { return !last || known.stale[b]; };
+    find_ranges(asked);
     std::vector<Real>& now = known.now[steps];
     now.resize(blocks_.size());
     const float shift = static_cast<float>(steps) / kShiftSteps;
-    if (!last) find_ranges();
     return parallel_sum(
-        blocks_.size(), Real{0},
-        [&](std::size_t b) { return now[b] = last && !known.stale[b] ? (*last)[known.before[b]] : of_block(b, shift); }, 32);
+        blocks_.size(), Real{0}, [&](std::size_t b) { return now[b] = asked(b) ? of_block(b, shift) : (*last)[known.before[b]]; }, 32);
   }
 
  private:
   struct Range {
-    float low, high;
+    float low, high;  // low > high: not looked for yet
   };
-  Range range_of(std::size_t b) const {
-    if (!range_.empty()) return range_[b];
-    const auto [low, high] = std::minmax_element(&phi_[b * kVoxels], &phi_[b * kVoxels] + kVoxels);
-    return {*low, *high};
-  }
-  /// Once for all, where most will be asked for.
-  void find_ranges() {
-    if (!range_.empty()) return;
-    std::vector<Range> ranges(blocks_.size());
+  static constexpr std::size_t kBeyond[7] = {14, 16, 17, 22, 23, 25, 26};  // where a block's cells reach
+
+  /// Of the blocks asked for and those that their cells reach into.
+  template <class Asked>
+  void find_ranges(Asked&& asked) {
+    std::vector<std::uint8_t> wanted(blocks_.size(), 0);
+    for (std::size_t b = 0; b < wanted.size(); ++b) {
+      if (!asked(b)) continue;
+      wanted[b] = 1;
+      for (const std::size_t slot : kBeyond)
+        if (const Index other = blocks_.around(b)[slot]; other != kNone) wanted[other] = 1;
+    }
     parallel_for(
-        ranges.size(), [&](std::size_t b) { ranges[b] = range_of(b); }, 64);
-    range_ = std::move(ranges);
+        wanted.size(),
+        [&](std::size_t b) {
+          if (!wanted[b] || range_[b].low <= range_[b].high) return;
+          const auto [low, high] = std::minmax_element(&phi_[b * kVoxels], &phi_[b * kVoxels] + kVoxels);
+          range_[b] = {*low, *high};
+        },
+        64);
   }
 
   /// Of the cells that begin at the block's voxels.
   Real of_block(std::size_t b, float shift) {
-    Range range = range_of(b);
-    for (const std::size_t slot : {14u, 16u, 17u, 22u, 23u, 25u, 26u}) {
+    Range range = range_[b];
+    for (const std::size_t slot : kBeyond) {
       const Index other = blocks_.around(b)[slot];
-      const Range beyond = other == kNone ? Range{outside_, outside_} : range_of(other);
+      const Range beyond = other == kNone ? Range{outside_, outside_} : range_[other];
       range = {std::min(range.low, beyond.low), std::max(range.high, beyond.high)};
     }
     if (range.low >= shift) return 0;
@@ -127,7 +135,7 @@ class Enclosed {
   const Blocks& blocks_;
   float outside_;
   const Field &phi_, &above_;
-  std::vector<Range> range_;  // of each block's values, once found
+  std::vector<Range> range_;  // of each block's values
   std::vector<float> full_;   // a block's volume when all of it is inside; -1: not asked yet
 };
 
@@ -144,16 +152,15 @@ Real enclosed(const Blocks& blocks, float outside, const Field& phi, const Field
 Shift matching_shift(const Blocks& blocks, float outside, const Field& phi, const Field& above, Real target, float most, KnownVolumes& known) {
   ZONE("skin.match_volume");
   Enclosed volume(blocks, outside, phi, above);
-  // In whole steps, so that a frame of which little has changed is shifted as the one before.
   const auto excess = [&](int k) { return volume(k, known) / target - 1; };
-  const int end = static_cast<int>(most * kShiftSteps);
-  // Out from zero by steps that double until the target lies between (a first one usually does), then regula falsi with
-  // the weight of an end that stays halved (Illinois): the volume rises with the shift, but may jump (pieces, thin sheets).
-  int low = 0, high = 0;
-  Real at_low = excess(0), at_high = at_low;
-  for (int step = std::max(1, end / 8); at_low > 0 || at_high < 0; step *= 2) {
-    const bool outward = at_high < 0;
-    if ((outward && high >= end) || (!outward && low <= -end)) break;
+  // The volume rises with the shift (it may jump: pieces, thin sheets), so there is one pair of neighbouring steps between which it passes
+  // the target, wherever the search begins. Out by steps that double until the target lies between, then regula falsi with the
+  // weight of an end that stays halved (Illinois).
+  const int end = static_cast<int>(most * kShiftSteps), first = std::clamp(known.guess, -end, end);
+  int low = first, high = first;
+  Real at_low = excess(first), at_high = at_low;
+  const bool outward = at_low < 0;
+  for (int step = known.last ? 1 : std::max(1, end / 8); outward ? at_high < 0 && high < end : at_low >= 0 && low > -end; step *= 2) {
     if (outward) {
       low = high;
       at_low = at_high;
@@ -166,27 +173,29 @@ Shift matching_shift(const Blocks& blocks, float outside, const Field& phi, cons
       at_low = excess(low);
     }
   }
-  int stayed = 0, best = std::abs(at_low) <= std::abs(at_high) ? low : high;
-  Real at_best = best == low ? at_low : at_high;
-  while (high - low > 1 && at_low < 0 && at_high > 0) {
-    const Real slope = (at_high - at_low) / (high - low);
-    const int middle = std::clamp(static_cast<int>(std::lround(low - at_low / slope)), low + 1, high - 1);
+  Real weight_low = at_low, weight_high = at_high;
+  int stayed = 0;
+  while (high - low > 1 && at_low < 0 && at_high >= 0) {
+    const int middle = std::clamp(static_cast<int>(std::floor(low - weight_low * (high - low) / (weight_high - weight_low))), low + 1, high - 1);
     const Real at_middle = excess(middle);
-    if (std::abs(at_middle) <= std::abs(at_best)) best = middle, at_best = at_middle;
-    if (std::abs(at_middle) <= slope / 2) break;
     if (at_middle < 0) {
       low = middle;
-      at_low = at_middle;
-      if (stayed > 0) at_high /= 2;
+      weight_low = at_low = at_middle;
+      if (stayed > 0) weight_high /= 2;
       stayed = 1;
     } else {
       high = middle;
-      at_high = at_middle;
-      if (stayed < 0) at_low /= 2;
+      weight_high = at_high = at_middle;
+      if (stayed < 0) weight_low /= 2;
       stayed = -1;
     }
   }
-  return {static_cast<float>(best) / kShiftSteps, (at_best + 1) * target};
+  const bool lower = at_low >= 0 || (at_high >= 0 && -at_low <= at_high);
+  // Steps beside these are kept known: the next frame may want them.
+  if (known.last)
+    for (const auto& [k, of_blocks] : *known.last)
+      if (k >= low - 1 && k <= high + 1 && !known.now.contains(k)) volume(k, known);
+  return {lower ? low : high, ((lower ? at_low : at_high) + 1) * target};
 }
 
 Real volume_above_ground(const LevelSet& surface, const geometry::Terrain* terrain) {

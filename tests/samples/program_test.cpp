@@ -153,6 +153,112 @@ rate = "-3 m3/s"
   }
 }
 
+TEST_F(ProgramTest, TellsAMisspeltKeyThatIsRequiredOnceAndWithTheNameItMeant) {
+  const std::string sound = read_file(kScenes / "lava.toml");
+  struct Case {
+    std::string name, slip, says;
+  };
+  for (const Case& c : std::vector<Case>{{"spacing =", "spacng =", "lava.spacng: unknown key; did you mean 'spacing'?"},
+                                         {"width = \"5 m\"", "widht = \"5 m\"", "lava.vent[0].widht: unknown key; did you mean 'width'?"},
+                                         {"file =", "fiel =", "terrain.fiel: unknown key; did you mean 'file'?"},
+                                         {"[terrain]", "[terain]", "terain: unknown key; did you mean 'terrain'?"},
+                                         {"[[lava.vent]]", "[[lava.vnet]]", "lava.vnet: unknown key; did you mean 'vent'?"}}) {
+    std::string text = sound;
+    text.replace(text.find(c.name), c.name.size(), c.slip);
+    const Outcome outcome = effuse({"check", write("slip.toml", text)});
+    EXPECT_EQ(outcome.code, 2);
+    EXPECT_NE(outcome.err.find(c.says), std::string::npos) << outcome.err;
+    if (c.slip != "fiel =" && c.slip != "[terain]") fs::copy_file(kScenes / "gully.asc", folder_ / "gully.asc", fs::copy_options::skip_existing);
+    EXPECT_EQ(count(effuse({"check", write("slip.toml", text)}).err, "error: "), 1u) << outcome.err;
+  }
+  // The effect itself, and a key that is missing without a slip.
+  std::string text = sound;
+  for (const char* table : {"[lava]", "[lava.viscosity]", "[[lava.vent]]"}) text.replace(text.find(table), std::string(table).size(), std::string(table).replace(std::string(table).find("lava"), 4, "lvaa"));
+  const Outcome effect = effuse({"check", write("slip.toml", text)});
+  EXPECT_EQ(count(effect.err, "error: "), 1u) << effect.err;
+  EXPECT_NE(effect.err.find("lvaa: unknown key; did you mean 'lava'?"), std::string::npos) << effect.err;
+  text = sound;
+  text.replace(text.find("spacing ="), 9, "colour =");
+  EXPECT_EQ(count(effuse({"check", write("slip.toml", text)}).err, "error: "), 2u) << "one that is missing, one that nobody knows";
+}
+
+TEST_F(ProgramTest, ASettingIsAKeyAndAValueInOneWord) {
+  for (const char* verb : {"run", "check"}) {
+    const Outcome outcome = effuse({verb, kScenes / "lava.toml", "--set", "lava.spacing", "2"});
+    EXPECT_EQ(outcome.code, 2);
+    EXPECT_NE(outcome.err.find("wanted KEY=VALUE"), std::string::npos) << outcome.err;
+    EXPECT_NE(effuse({verb, "--help"}).out.find("--set KEY=VALUE"), std::string::npos);
+  }
+}
+
+TEST_F(ProgramTest, ACameraLooksAtAPointOfTheGround) {
+  const Arguments close = {"--set", "preview.target=[18, 46]", "--set", "preview.distance=12 m", "--set", "preview.fov=50 deg", "--set", "preview.elevation=40 deg", "--set", "preview.width=160", "--set", "preview.height=90"};
+  Arguments arguments = {"run", kScenes / "lava.toml", "-o", folder_ / "out", "--frames", "2", "--set", "lava.spacing=1.2 m", "--set", "output.formats=[]"};
+  arguments.insert(arguments.end(), close.begin(), close.end());
+  const Outcome outcome = effuse(arguments);
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_TRUE(fs::exists(folder_ / "out" / "preview" / "preview.0002.png"));
+  EXPECT_EQ(effuse({"check", folder_ / "out" / "scene.toml"}).code, 0) << "as resolved";
+  const Outcome buried = effuse({"check", kScenes / "lava.toml", "--set", "preview.target=[18, 46, 0]", "--set", "preview.distance=0.1"});
+  EXPECT_EQ(buried.code, 2);
+  EXPECT_NE(buried.err.find("in the ground"), std::string::npos) << buried.err;
+  const Outcome two = effuse({"check", kScenes / "lava.toml", "--set", "preview.target=[18, 46]", "--set", "preview.distance=9", "--set", "preview.view=[18, 46, 9]"});
+  EXPECT_EQ(two.code, 2);
+  EXPECT_EQ(count(two.err, "error: "), 1u) << two.err;
+}
+
+TEST_F(ProgramTest, TheReadmesCameraIsOneOfTheMountain) {
+  const std::string readme = read_file(fs::path(EFFUSE_SOURCE_DIR) / "README.md"), fence = "```toml\n[preview]\n";
+  const std::size_t begin = readme.find(fence) + fence.size() - std::string("[preview]\n").size();
+  ASSERT_LT(begin, readme.size());
+  std::string scene = read_file(kScenes / "maunga-whau.toml");
+  scene.resize(scene.find("[preview]"));
+  fs::copy_file(kScenes / "maunga-whau.asc", folder_ / "maunga-whau.asc");
+  const Outcome outcome = effuse({"check", write("close.toml", scene + readme.substr(begin, readme.find("```", begin) - begin))});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+}
+
+TEST_F(ProgramTest, SaysWhereTheTimeWentInALineAndAllOfItWhenAsked) {
+  const Outcome brief = effuse(run_gully(folder_ / "out", 2));
+  ASSERT_EQ(brief.code, 0) << brief.err;
+  EXPECT_EQ(count(brief.err, "took "), 1u) << brief.err;
+  EXPECT_EQ(count(brief.err, " %"), 3u) << "three parts\n" << brief.err;
+  EXPECT_LE(count(brief.err, "\n"), 4u) << "two frames, that line, and where they are\n" << brief.err;
+  const Outcome all = effuse(run_gully(folder_ / "out", 2, {"--force", "--stats"}));
+  EXPECT_NE(all.err.find("sph.forces"), std::string::npos) << all.err;
+  EXPECT_NE(all.err.find("skin.triangles"), std::string::npos) << all.err;
+}
+
+TEST_F(ProgramTest, ThereIsNothingToGoOnWithWhereNoRunIs) {
+  const Outcome absent = effuse(run_gully(folder_ / "absent", 2, {"--resume"}));
+  EXPECT_EQ(absent.code, 2);
+  EXPECT_NE(absent.err.find("does not exist, so there is nothing to go on with"), std::string::npos) << absent.err;
+  EXPECT_FALSE(fs::exists(folder_ / "absent"));
+  fs::create_directories(folder_ / "empty");
+  const Outcome empty = effuse(run_gully(folder_ / "empty", 2, {"--resume"}));
+  EXPECT_EQ(empty.code, 2);
+  EXPECT_NE(empty.err.find("holds no run"), std::string::npos) << empty.err;
+  EXPECT_TRUE(fs::is_empty(folder_ / "empty"));
+}
+
+TEST_F(ProgramTest, TellsTheSkinsMemoryToo) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "a sanitizer's shadow is several times what it watches";
+#endif
+  // The program alone; and a skin of fine voxels, which takes half as much again.
+  for (const Arguments& settings : {Arguments{"output.formats=[]", "lava.spacing=1.2 m"}, Arguments{"output.formats=[\"ply\", \"glb\"]", "skin.voxel=0.2", "lava.spacing=0.5 m"}}) {
+    Arguments check = {"check", kScenes / "lava.toml", "--json"}, run = {"run", kScenes / "lava.toml", "-o", folder_ / "out", "--force", "--json", "--quiet"};
+    for (Arguments* verb : {&check, &run}) {
+      for (const std::string& setting : settings) verb->insert(verb->end(), {"--set", setting});
+      verb->insert(verb->end(), {"--set", "film.frames=2", "--set", "film.time_scale=40", "--set", "preview.pictures=false"});
+    }
+    const Outcome told = effuse(check), made = effuse(run);
+    ASSERT_EQ(told.code + made.code, 0) << told.err << made.err;
+    const double expected = nlohmann::json::parse(told.out).at("memory_bytes").get<double>(), taken = nlohmann::json::parse(made.out).at("peak_memory_bytes").get<double>();
+    EXPECT_NEAR(expected / taken, 1, 0.25) << expected << " told, taken " << taken;
+  }
+}
+
 TEST_F(ProgramTest, RefusesBrokenTerrainInOneSentenceAndLeavesNoFolder) {
   const std::string header = "ncols 3\nnrows 3\nxllcorner 0\nyllcorner 0\ncellsize 10\n";
   write("empty.asc", "");
@@ -262,10 +368,11 @@ TEST_F(ProgramTest, InterruptedItCheckpointsAndSaysHowToGoOn) {
   EXPECT_EQ(outcome.code, 130) << outcome.err;
   EXPECT_NE(outcome.err.find("--resume"), std::string::npos) << outcome.err;
   // The line it prints is the one that works: with the frames and the overrides of the run.
-  const std::size_t at = outcome.err.find("effuse run ");
+  const std::string call = fmt::format("{} run ", EFFUSE_PROGRAM);  // as it was called
+  const std::size_t at = outcome.err.find(call);
   ASSERT_NE(at, std::string::npos) << outcome.err;
-  const std::string line = outcome.err.substr(at + 6, outcome.err.find('\n', at) - at - 6);
-  ASSERT_EQ(std::system(fmt::format("'{}'{} --quiet", EFFUSE_PROGRAM, line).c_str()), 0) << line;
+  const std::string line = outcome.err.substr(at, outcome.err.find('\n', at) - at);
+  ASSERT_EQ(std::system((line + " --quiet").c_str()), 0) << line;
   expect_same_files(whole, broken, 10 * 4);
 }
 
@@ -308,6 +415,19 @@ TEST_F(ProgramTest, DescribesItsOwnFiles) {
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_NE(outcome.out.find("surface"), std::string::npos) << outcome.out;
   EXPECT_EQ(effuse({"effects"}).code, 0);
+  // The run, by its folder, a folder in it, or its reports: the same words.
+  const auto facts = [&](const fs::path& file) { return nlohmann::json::parse(effuse({"info", file, "--json"}).out).at(0).at("facts"); };
+  const nlohmann::json run = facts(out);
+  EXPECT_EQ(run.at(0), "run of 'Lava in a gully': 4 frames at 24 a second, 0.17 s of film, 0.666667 s of lava");
+  EXPECT_NE(run.dump().find("done, "), std::string::npos) << run;
+  EXPECT_NE(run.dump().find("lava: "), std::string::npos) << run;
+  EXPECT_NE(run.dump().find("time went to "), std::string::npos) << run;
+  for (const char* name : {"run.json", "manifest.json", "frames", "frames/", "checkpoints"}) EXPECT_EQ(facts(out / name).at(0), run.at(0)) << name;
+  const Outcome none = effuse({"info", folder_});
+  EXPECT_EQ(none.code, 2);
+  EXPECT_NE(none.err.find("holds no run"), std::string::npos) << none.err;
+  write("out/run.json", "{\"outcome\": ");
+  EXPECT_NE(effuse({"info", out}).err.find("run.json: is damaged"), std::string::npos);
   // The resolved scene is a scene: it checks, and says the same again.
   EXPECT_EQ(effuse({"check", out / "scene.toml"}).code, 0);
 }
@@ -435,7 +555,7 @@ class ProgramSlow : public ProgramTest {
  protected:
   static Arguments run_mountain(const fs::path& out, const Arguments& more = {}) {
     Arguments arguments = {"run", kScenes / "maunga-whau.toml", "-o", out, "--frames", "40", "--set", "output.checkpoint_every=20", "--set", "preview.width=320", "--set",
-                           "preview.height=180"};
+                           "preview.height=180", "--stats"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return arguments;
   }

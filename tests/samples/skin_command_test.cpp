@@ -4,6 +4,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -472,10 +473,130 @@ TEST_F(SkinCommandTest, TheTerrainEndsTheSkinInTheParticlesCoordinates) {
   EXPECT_TRUE(contains(beside.err, "no particle lies over ground.asc")) << beside.err;
 }
 
+/// The numbered block moved, in another order, as hot as told; without ids where asked.
+std::string moved_block(const Vec3& by, bool backwards, const std::string& kelvin, bool ids = true) {
+  std::string block = std::string("x,y,z,radius") + (ids ? ",id" : "") + (kelvin.empty() ? "" : ",temperature") + "\n";
+  for (std::uint64_t k = 0; k < 400; ++k) {
+    const std::uint64_t n = backwards ? 399 - k : k;
+    block += fmt::format("{},{},{},0.5", static_cast<Real>(n % 10) + by.x(), static_cast<Real>(n / 10 % 10) + by.y(), static_cast<Real>(n / 100) + by.z());
+    block += (ids ? fmt::format(",{}", 70 + n) : "") + (kelvin.empty() ? "" : "," + kelvin) + "\n";
+  }
+  return block;
+}
+
+TEST_F(SkinCommandTest, EveryKindOfSkinIsDisplacedColouredAndSound) {
+  write("block.csv", moved_block(Vec3::Zero(), false, "1150"));
+  ASSERT_EQ(skin({"block.csv", "-o", "smooth.ply", "--check"}).code, 0);
+  const TriMesh smooth = mesh("smooth.ply");
+  EXPECT_FALSE(smooth.attributes.contains("color"));
+  for (const std::string kind : {"noise", "aa", "pahoehoe", "block", "obsidian"}) {
+    const Outcome outcome = skin({"block.csv", "-o", "skin.ply", "-o", "skin.vdb", "--kind", kind, "--edge", "0.25", "--check", "--json"});
+    ASSERT_EQ(outcome.code, 0) << kind << outcome.out << outcome.err;
+    EXPECT_TRUE(contains(outcome.err, "hangs its detail in space")) << outcome.err;
+    const json j = json::parse(outcome.out).at("frames").at(0);
+    EXPECT_EQ(j.at("kind"), kind);
+    EXPECT_GT(j.at("largest_displacement").get<double>(), 0.05) << kind;
+    EXPECT_GT(j.at("triangles").get<std::size_t>(), 2 * smooth.triangles.size()) << kind;
+    const TriMesh found = mesh("skin.ply");
+    EXPECT_NEAR(geometry::signed_volume(found), 400, 0.04 * 400) << kind;
+    for (const char* name : {"color", "glow", "detail", "temperature"}) EXPECT_TRUE(found.attributes.contains(name)) << kind << " " << name;
+    const std::vector<float>& glow = found.attributes.at("glow").values;
+    EXPECT_GT(*std::max_element(glow.begin(), glow.end()), 0.02f) << kind;
+  }
+  // Colours alone; and the smooth skin is what it was.
+  ASSERT_EQ(skin({"block.csv", "-o", "flat.ply", "--kind", "noise", "--amplitude", "0"}).code, 0);
+  EXPECT_EQ(mesh("flat.ply").positions, smooth.positions);
+  EXPECT_TRUE(mesh("flat.ply").attributes.contains("color"));
+  ASSERT_EQ(skin({"block.csv", "-o", "none.ply", "--kind", "none"}).code, 0);
+  EXPECT_EQ(read_file(folder_ / "none.ply"), read_file(folder_ / "smooth.ply"));
+  // Another seed, other bumps.
+  ASSERT_EQ(skin({"block.csv", "-o", "one.ply", "--kind", "aa"}).code, 0);
+  ASSERT_EQ(skin({"block.csv", "-o", "two.ply", "--kind", "aa", "--seed", "2"}).code, 0);
+  EXPECT_NE(mesh("one.ply").positions, mesh("two.ply").positions);
+}
+
+TEST_F(SkinCommandTest, DetailMovesWithTheParticlesIdsAndWithoutThemSwims) {
+  // Eight voxels on, where the smooth surface is the same again, in another order.
+  const Vec3 by(4, -8, 0);
+  const auto largest_difference = [&](bool ids, const std::string& kind, const std::string& tessellation) {
+    write("a.0001.csv", moved_block(Vec3::Zero(), false, "", ids));
+    write("a.0002.csv", moved_block(by, true, "", ids));
+    const Outcome outcome = skin({"a.####.csv", "-o", "m.####.ply", "--kind", kind, "--tessellation", tessellation, "--json"});
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    EXPECT_EQ(contains(outcome.err, "it will swim"), !ids) << outcome.err;
+    EXPECT_EQ(json::parse(outcome.out).at("frames").at(1).at("detail_on"), ids ? "id" : "world");
+    const TriMesh one = mesh("m.0001.ply"), two = mesh("m.0002.ply");
+    EXPECT_EQ(one.positions.size(), two.positions.size());
+    Real largest = 0;
+    for (std::size_t v = 0; v < std::min(one.positions.size(), two.positions.size()); ++v) largest = std::max(largest, (two.positions[v] - by - one.positions[v]).norm());
+    return largest;
+  };
+  for (const std::string kind : {"aa", "noise"}) {
+    EXPECT_LT(largest_difference(true, kind, "levelset"), 1e-3) << kind;
+    EXPECT_GT(largest_difference(false, kind, "levelset"), 0.05) << kind;
+  }
+}
+
+TEST_F(SkinCommandTest, TemperaturesAreTheFilesOrToldAndWithoutAnyNothingGlows) {
+  write("cold.csv", moved_block(Vec3::Zero(), false, ""));
+  write("hot.csv", moved_block(Vec3::Zero(), false, "1200"));
+  const auto made = [&](Arguments arguments) {
+    arguments.insert(arguments.end(), {"-o", "m.ply", "--kind", "noise"});
+    const Outcome outcome = skin(arguments);
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    return std::pair{mesh("m.ply"), outcome.err};
+  };
+  EXPECT_FALSE(made({"cold.csv"}).first.attributes.contains("glow"));
+  const auto [told, told_err] = made({"cold.csv", "--temperature", "926.85 degC"});
+  EXPECT_NEAR(told.attributes.at("temperature").values.front(), 1200, 0.01);
+  const auto [own, own_err] = made({"hot.csv", "--temperature", "400"});
+  EXPECT_TRUE(contains(own_err, "has temperatures of its own")) << own_err;
+  EXPECT_EQ(own.attributes.at("glow").values, told.attributes.at("glow").values);
+  EXPECT_TRUE(contains(made({"cold.csv", "--temperature", "600"}).second, "nothing glows below 800 K"));
+}
+
+TEST_F(SkinCommandTest, TurningUpwardsLeavesColoursAsTheyAre) {
+  write("hot.csv", moved_block(Vec3::Zero(), false, "1200"));
+  ASSERT_EQ(skin({"hot.csv", "-o", "z.glb", "--kind", "noise"}).code, 0);
+  ASSERT_EQ(skin({"hot.csv", "-o", "y.glb", "--kind", "noise", "--up", "y"}).code, 0);
+  const TriMesh z = mesh("z.glb"), y = mesh("y.glb");
+  ASSERT_TRUE(z.attributes.contains("color"));
+  EXPECT_EQ(z.attributes.at("color").values, y.attributes.at("color").values);
+  EXPECT_NE(z.positions, y.positions);
+}
+
+TEST_F(SkinCommandTest, RefusesDetailThatNothingWouldShow) {
+  write("good.xyz", "0 0 0\n1 0 0\n");
+  struct Case {
+    Arguments arguments;
+    std::string says;
+  };
+  for (const Case& c : std::vector<Case>{{{"-o", "a.ply", "--amplitude", "0.3"}, "go with --kind"},
+                                         {{"-o", "a.ply", "--edge", "0.3"}, "go with --kind"},
+                                         {{"-o", "a.ply", "--seed", "3"}, "go with --kind"},
+                                         {{"-o", "a.ply", "--temperature", "1200"}, "go with --kind"},
+                                         {{"-o", "a.vdb", "--kind", "aa"}, "--kind aa goes with a mesh"},
+                                         {{"-o", "a.ply", "--kind", "lava"}, "--kind"},
+                                         {{"-o", "a.ply", "--kind", "aa", "--temperature", "12 m"}, "--temperature:"},
+                                         {{"-o", "a.ply", "--kind", "aa", "--temperature", "-5"}, "wanted more than 0"},
+                                         {{"-o", "a.ply", "--kind", "aa", "--edge", "nan"}, "--edge"}}) {
+    Arguments arguments = {"good.xyz", "-r", "0.5"};
+    arguments.insert(arguments.end(), c.arguments.begin(), c.arguments.end());
+    const Outcome outcome = skin(arguments);
+    EXPECT_EQ(outcome.code, 2) << c.says;
+    EXPECT_TRUE(contains(outcome.err, c.says)) << "'" << outcome.err << "' instead of '" << c.says << "'";
+    EXPECT_EQ(files(), 1u) << c.says;
+  }
+}
+
 TEST_F(SkinCommandTest, TheSameBytesOnOneAndTwoThreads) {
   write("a.vtk", hand_written::vtk_binary());
   ASSERT_EQ(skin({"a.vtk", "-o", "one.ply", "--threads", "1"}).code, 0);
   ASSERT_EQ(skin({"a.vtk", "-o", "two.ply", "--threads", "2"}).code, 0);
+  EXPECT_EQ(read_file(folder_ / "one.ply"), read_file(folder_ / "two.ply"));
+  write("block.csv", moved_block(Vec3::Zero(), false, "1100"));
+  ASSERT_EQ(skin({"block.csv", "-o", "one.ply", "--kind", "block", "--threads", "1"}).code, 0);
+  ASSERT_EQ(skin({"block.csv", "-o", "two.ply", "--kind", "block", "--threads", "2"}).code, 0);
   EXPECT_EQ(read_file(folder_ / "one.ply"), read_file(folder_ / "two.ply"));
 }
 

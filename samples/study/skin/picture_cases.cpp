@@ -7,6 +7,7 @@
 #include "samples/study/skin/cases.h"
 #include "samples/study/skin/closeups.h"
 #include "samples/study/skin/jpeg.h"
+#include "skin/preview/gloss.h"
 #include "skin/preview/preview.h"
 #include "skin/write/png.h"
 
@@ -51,7 +52,9 @@ CaseResult closeups() {
     Curve light{stage.name, {}, {}, true, false};
     for (int k = 0; k <= static_cast<int>(std::size(kKinds)); ++k) {
       const SkinKind* kind = k == 0 ? nullptr : &kKinds[k - 1];
-      const skin::Image image = preview.render(skin_of_toe(toe, kind, view, kPixels), view);
+      skin::PreviewOptions lit = view;
+      if (kind) lit.gloss = skin::gloss_of(*kind);
+      const skin::Image image = preview.render(skin_of_toe(toe, kind, view, kPixels), lit);
       pictures.push_back(folder.path / fmt::format("{}.png", pictures.size()));
       labels.push_back(fmt::format("{} {}", kind ? skin::kSkinKindNames[static_cast<std::size_t>(*kind)] : "no displacement", stage.name));
       skin::write_png(pictures.back(), image);

@@ -155,6 +155,68 @@ TEST(Preview, LavaWithoutColoursIsDarkRockAndNightIsDarkButForTheGlow) {
   EXPECT_LT(pixel(night, 2, 34).maxCoeff(), 0.05) << "the ground in the corner does not";
 }
 
+/// Square of rock over flat ground, of that temperature.
+TriMesh plate(float kelvin) {
+  TriMesh mesh;
+  mesh.positions = {{-90, -90, 1}, {90, -90, 1}, {90, 90, 1}, {-90, 90, 1}};
+  mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+  mesh.attributes["color"] = {3, std::vector<float>(12, 0.05f)};
+  mesh.attributes["temperature"] = {1, std::vector<float>(4, kelvin)};
+  return mesh;
+}
+
+TEST(Preview, ByNightColdRubbleIsAsDarkAsItsColourWhereGlassAndFreshLavaMirrorTheSky) {
+  TriMesh flat = hill_mesh(11);
+  for (Vec3& p : flat.positions) p.z() = 0;
+  const Preview preview(flat);
+  PreviewOptions options = looking_down(64, 36);
+  options.sun_direction = Vec3(-std::cos(-0.05), 0, std::sin(-0.05));  // just set, in the west
+  options.haze = options.bloom = options.glow_light = 0;
+  options.camera = {Vec3(85, 0, 8), Vec3(-20, 0, 1), 0.2};
+  // Light of what is seen low over the rock, against that of its colour under the whole sky.
+  const auto shine = [&](float kelvin, Real gloss) {
+    options.gloss = gloss;
+    const Image image = preview.render(plate(kelvin), options);
+    double sum = 0;
+    for (int x = 0; x < image.width; ++x) sum += pixel(image, x, 20).mean();
+    return sum / image.width / (0.05 * Sky(options.sun_direction, options.sun, options.sky).ambient(Vec3f::UnitZ()).cast<double>().mean());
+  };
+  EXPECT_NEAR(shine(300, 0), 1, 0.35);
+  EXPECT_GT(shine(300, 1), 2.5);
+  EXPECT_GT(shine(1400, 0), 1.5) << "a film of melt";
+  EXPECT_LT(shine(300, 0.15), 1.6);
+}
+
+TEST(Preview, ALowSunMakesNoDarkTilesOfADemInWholeMetres) {
+  // Posts 10 m apart on a slope that the sun just grazes; heights as they are, and rounded.
+  TriMesh even, rounded;
+  constexpr int n = 41;
+  for (int j = 0; j < n; ++j)
+    for (int i = 0; i < n; ++i) {
+      const double x = 10 * (i - n / 2), y = 10 * (j - n / 2);
+      const double z = 0.13 * x + 6 * std::sin(0.02 * x) * std::cos(0.023 * y);
+      even.positions.emplace_back(x, y, z);
+      rounded.positions.emplace_back(x, y, std::round(z));
+    }
+  for (int j = 0; j + 1 < n; ++j)
+    for (int i = 0; i + 1 < n; ++i) {
+      const Index a = static_cast<Index>(j * n + i), b = a + 1, c = a + static_cast<Index>(n), d = c + 1;
+      even.triangles.push_back({a, b, d});
+      even.triangles.push_back({a, d, c});
+    }
+  rounded.triangles = even.triangles;
+  PreviewOptions options = looking_down(160, 120);
+  options.camera = {Vec3(0, 0, 420), Vec3(0, 0, 0), 0.7};
+  options.sun_direction = Vec3(0.97, 0, 0.235);  // 13.6 degrees over the uphill side
+  options.bloom = 0;
+  options.sky = 0.1;
+  const Image smooth_light = Preview(even).render({}, options), light = Preview(rounded).render({}, options);
+  int dark = 0, all = 0;
+  for (int y = 0; y < options.height; ++y)
+    for (int x = 0; x < options.width; ++x, ++all) dark += pixel(light, x, y).mean() < 0.5 * pixel(smooth_light, x, y).mean();
+  EXPECT_LT(dark, 0.001 * all) << "1.3 % of the picture, in tiles as large as cells, where facets shade one another";
+}
+
 TEST(Preview, BadOptionsAndBrokenMeshesAreInputErrors) {
   const Preview preview(hill_mesh(5));
   const auto refused = [&](auto&& change) {
@@ -169,6 +231,7 @@ TEST(Preview, BadOptionsAndBrokenMeshesAreInputErrors) {
   refused([](PreviewOptions& o) { o.camera.field_of_view = 4; });
   refused([](PreviewOptions& o) { o.sun_direction = Vec3::Zero(); });
   refused([](PreviewOptions& o) { o.exposure = std::nan(""); });
+  refused([](PreviewOptions& o) { o.gloss = 1.5; });
   TriMesh broken = hill_mesh(5);
   broken.triangles[3][0] = 999;
   EXPECT_THROW(Preview{broken}, InputError);

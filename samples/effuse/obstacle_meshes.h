@@ -1,0 +1,24 @@
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "flow/scene/obstacles.h"
+#include "flow/scene/scene.h"
+#include "geometry/mesh/tri_mesh.h"
+
+namespace effuse {
+
+/// Reads the meshes of a scene's obstacles, relative to its folder, and puts them on the terrain. What goes wrong is a fault at the
+/// line that names the file. notes: what was done to meshes on the way, a line each.
+std::vector<flow::PlacedObstacle> load_obstacles(const flow::Scene& scene, const std::filesystem::path& folder, const geometry::Terrain& terrain, std::vector<Fault>& faults,
+                                                 std::vector<std::string>& notes);
+
+/// All obstacles where they are at a time, as one mesh; edges are sharp.
+geometry::TriMesh obstacles_at(const std::vector<flow::PlacedObstacle>& obstacles, Real time);
+bool any_moves(const std::vector<flow::PlacedObstacle>& obstacles);
+
+/// Lava and obstacles for one picture: these in the grey of concrete, cold and dull.
+geometry::TriMesh in_one_picture(geometry::TriMesh lava, const geometry::TriMesh& obstacles);
+
+}  // namespace effuse
