@@ -38,6 +38,9 @@ struct SolidOptions {
 /// Unlike the ground it keeps no bounds from step to step: what is near is asked each step, at one box test a particle where
 /// obstacles are far. The same bits on any number of threads.
 ///
+/// A wall's drag is that of a half-space; beside the obstacle's convex edges (the end of a wall, the corners of a gap) it counts by the
+/// share of that half-space which the obstacles hide from the particle. In full it would hold lava in a gap six spacings wide back by 13 %.
+///
 /// Known limit: at the inner edges of a vessel the sums still miss a little; lava at rest in it creeps round by 0.08 g spacing^2 / nu.
 class Solids {
  public:
@@ -76,6 +79,9 @@ class Solids {
  private:
   static constexpr int kMost = 4;  // surfaces that a particle feels at a time
 
+  Real friction_of(Index surface) const;
+  void find_backing(std::span<const Vec3> x, Real reach, const Walls& ground);
+
   SolidOptions options_;
   Real radius_, mass_;
   Real speed_ = 0, fastest_ = 0;
@@ -83,6 +89,7 @@ class Solids {
   std::vector<Index> near_, met_;
   std::vector<Vec3> at_, way_, speed_at_;
   std::vector<geometry::Contact> contacts_;
+  std::vector<Real> backing_;  // of each contact
   std::vector<Index> count_;
   Walls merged_;
 };

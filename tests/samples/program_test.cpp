@@ -305,6 +305,62 @@ TEST_F(ProgramTest, TellsAVentBesideTheTerrainTogetherWithOtherFaults) {
   EXPECT_NE(outcome.err.find("kg"), std::string::npos) << outcome.err;
 }
 
+TEST_F(ProgramTest, RunsLavaRoundAHouseAndWritesItBesideTheTerrain) {
+  const fs::path out = folder_ / "house";
+  const auto arguments = [&](const char* frames, const Arguments& more) {
+    Arguments all = {"run", kScenes / "house.toml", "-o", out, "--frames", frames, "--set", "lava.spacing=1 m", "--set", "preview.pictures=false", "--set", "output.formats=[\"ply\"]"};
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  };
+  ASSERT_EQ(effuse(arguments("3", {})).code, 0);
+  EXPECT_TRUE(fs::exists(out / "obstacles.ply"));
+  EXPECT_TRUE(fs::exists(out / "obstacles.glb"));
+  EXPECT_FALSE(fs::exists(out / "frames" / "obstacles.0001.ply")) << "it stands";
+  EXPECT_NE(read_file(out / "manifest.json").find("obstacles.ply"), std::string::npos);
+  // The resolved scene finds the mesh from elsewhere; a run goes on among the same obstacles only.
+  EXPECT_EQ(effuse({"check", out / "scene.toml"}).code, 0);
+  EXPECT_EQ(effuse(arguments("5", {"--resume"})).code, 0);
+  EXPECT_EQ(effuse(arguments("6", {"--resume", "--set", "obstacle[0].scale=2"})).code, 2);
+}
+
+TEST_F(ProgramTest, WritesObstaclesThatMoveFrameByFrame) {
+  std::string text = read_file(kScenes / "house.toml");
+  const auto put = [&](const std::string& from, const std::string& to) { text.replace(text.find(from), from.size(), to); };
+  put("gully.asc", (kScenes / "gully.asc").string());
+  put("house.obj", (kScenes / "house.obj").string());
+  put("position = [18, 24, 0]", "motion = \"linear\"");
+  put("[skin]", "[[obstacle.key]]\ntime = 0\nposition = [18, 34, 0]\n[[obstacle.key]]\ntime = 1\nposition = [18, 30, 0]\nrotation = [\"0 deg\", \"0 deg\", \"40 deg\"]\n\n[skin]");
+  const fs::path out = folder_ / "moving";
+  const Outcome run = effuse({"run", write("scene.toml", text), "-o", out, "--frames", "3", "--set", "lava.spacing=1 m", "--set", "preview.pictures=false", "--set", "output.formats=[\"ply\"]"});
+  ASSERT_EQ(run.code, 0) << run.err;
+  EXPECT_NE(read_file(out / "frames" / "obstacles.0001.ply"), read_file(out / "frames" / "obstacles.0003.ply"));
+}
+
+TEST_F(ProgramTest, TellsWhatIsWrongWithAnObstacleAtItsLine) {
+  const std::string scene = read_file(kScenes / "house.toml");
+  const auto with = [&](const std::string& from, const std::string& to) {
+    std::string text = scene;
+    text.replace(text.find("gully.asc"), 9, (kScenes / "gully.asc").string());
+    text.replace(text.find(from), from.size(), to);
+    return write("scene.toml", text);
+  };
+  const Outcome missing = effuse({"check", with("house.obj", "hut.obj")});
+  EXPECT_EQ(missing.code, 2);
+  EXPECT_NE(missing.err.find("scene.toml:25"), std::string::npos) << missing.err;
+  EXPECT_NE(missing.err.find("hut.obj"), std::string::npos) << missing.err;
+  write_file(folder_ / "house.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");
+  const Outcome flat = effuse({"check", with("[18, 24, 0]", "[18, 24, 0]")});
+  EXPECT_EQ(flat.code, 2) << "no triangle has an area";
+  fs::copy_file(kScenes / "house.obj", folder_ / "house.obj", fs::copy_options::overwrite_existing);
+  const Outcome beside = effuse({"check", with("[18, 24, 0]", "[1800, 24, 0]")});
+  EXPECT_EQ(beside.code, 2);
+  EXPECT_NE(beside.err.find("is not on the terrain"), std::string::npos) << beside.err;
+  const Outcome classic = effuse({"check", with("model = \"modern\"\npreset = \"etna\"", "model = \"classic\"")});
+  EXPECT_EQ(classic.code, 2);
+  EXPECT_NE(classic.err.find("obstacle"), std::string::npos) << classic.err;
+  EXPECT_EQ(effuse({"check", with("[18, 24, 0]", "[18, 24, 0]")}).code, 0);
+}
+
 TEST_F(ProgramTest, NamesTheNearestVerbAndRefusesAnUnknownFlag) {
   const Outcome verb = effuse({"chekc", "x.toml"});
   EXPECT_EQ(verb.code, 2);
