@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <limits>
 #include <string>
 
 #include "flow/effects/classic_lava_effect.h"
@@ -32,6 +34,24 @@ void tell_of_the_other_model(Parameters& p, bool modern) {
     tell(kClassic, "classic");
   else
     tell(kModern, "modern");
+}
+
+/// Lava that comes out in or right beside an obstacle has nowhere to go.
+void refuse_blocked_vents(const std::vector<PlannedVent>& plans, const std::vector<sph::Vent>& vents, const World& world, Real spacing, std::vector<Fault>& faults) {
+  if (!world.obstacles || spacing <= 0) return;
+  std::size_t placed = 0;
+  for (const PlannedVent& plan : plans) {
+    if (!plan.located || placed == vents.size()) continue;
+    const sph::Vent& vent = vents[placed++];
+    for (const PlacedObstacle& each : *world.obstacles) {
+      const geometry::RigidPose pose = each.track.at(vent.start);
+      Real nearest = std::numeric_limits<Real>::infinity();
+      for (const Vec3& site : vent.lattice(spacing)) nearest = std::min(nearest, each.shape.inside(pose.body(site)) ? 0 : each.shape.signed_distance(pose.body(site), 2 * spacing));
+      if (nearest >= 2 * spacing) continue;
+      faults.push_back({plan.place, fmt::format("obstacle '{}' is {} the vent when it opens, wanted at least two spacings, {:.3g} m, between them", each.name,
+                                                nearest <= 0 ? std::string("over") : fmt::format("{:.2g} m from", nearest), 2 * spacing)});
+    }
+  }
 }
 
 }  // namespace
@@ -66,11 +86,11 @@ EffectPlan read_lava(Parameters& p, Real duration) {
                               plan.estimate.steps, kMostSteps, model.sets_the_step));
     }
   }
-  plan.misfits = [vents, obstacles = model.obstacles, place = p.place("model")](const World& world) {
+  plan.misfits = [vents, spacing = model.spacing, obstacles = model.obstacles, place = p.place("model")](const World& world) {
     std::vector<Fault> faults;
-    if (!obstacles && world.obstacles && !world.obstacles->empty())
-      faults.push_back({place, "the classic model knows the terrain only: [[obstacle]] goes with model = \"modern\""});
-    place_vents(vents, *world.terrain, faults);
+    const bool solids = (world.obstacles && !world.obstacles->empty()) || (world.bodies && !world.bodies->empty());
+    if (!obstacles && solids) faults.push_back({place, "the classic model knows the terrain only: [[obstacle]] and [[body]] go with model = \"modern\""});
+    refuse_blocked_vents(vents, place_vents(vents, *world.terrain, faults), world, spacing, faults);
     return faults;
   };
   plan.build = [make = model.make, spacing = model.spacing, misfits = plan.misfits, vents](const World& world) {

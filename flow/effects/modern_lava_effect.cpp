@@ -32,11 +32,11 @@ std::vector<std::string> names(const std::string_view (&list)[N]) {
 
 class ModernLavaEffect final : public Effect {
  public:
-  ModernLavaEffect(const ModernOptions& options, const std::vector<Vent>& vents, const geometry::Terrain& terrain, const std::vector<PlacedObstacle>& obstacles)
-      : obstacles_(std::make_unique<SolidWorld>(obstacles, std::vector<PlacedBody>{}, &terrain)),
+  ModernLavaEffect(const ModernOptions& options, const std::vector<Vent>& vents, const geometry::Terrain& terrain, const std::vector<PlacedObstacle>& obstacles, const std::vector<PlacedBody>& bodies)
+      : solids_(std::make_unique<SolidWorld>(obstacles, bodies, &terrain)),
         lava_(options, vents,
               {[terrain](std::span<const Vec3> x, Real reach, std::span<geometry::Contact> out) { terrain.contacts(x, reach, out); }},
-              [terrain](const Vec3& p) { return terrain.height(p.x(), p.y()).has_value(); }, obstacles_->solids()),
+              [terrain](const Vec3& p) { return terrain.height(p.x(), p.y()).has_value(); }, solids_->solids()),
         heat_(options.heat.on) {
     for (const Vent& vent : vents) {
       if (vent.rate <= 0) continue;
@@ -67,16 +67,22 @@ class ModernLavaEffect final : public Effect {
   }
 
   geometry::Points points() const override { return lava_.points(); }
+  std::vector<geometry::RigidPose> body_poses() const override { return solids_->poses(); }
   Real volume() const override { return lava_.volume(); }
   Real spacing() const override { return lava_.options().spacing; }
   std::size_t memory() const override { return lava_.memory(); }
-  void add_to(StateHash& hash) const override { lava_.add_to(hash); }
+  void add_to(StateHash& hash) const override {
+    lava_.add_to(hash);
+    solids_->add_to(hash);
+  }
   void save(StateWriter& out) const override {
     lava_.save(out);
+    solids_->save(out);
     archive(*this, out);
   }
   void load(StateReader& in) override {
     lava_.load(in);
+    solids_->load(in);
     archive(*this, in);
   }
 
@@ -195,7 +201,7 @@ class ModernLavaEffect final : public Effect {
     io.value("max_speed", self.last_.max_speed);
   }
 
-  std::unique_ptr<SolidWorld> obstacles_;  // lava_ refers to it
+  std::unique_ptr<SolidWorld> solids_;  // lava_ refers to it
   ModernLava lava_;
   bool heat_;
   std::vector<Opening> openings_;
@@ -353,7 +359,8 @@ LavaModel read_modern_lava(Parameters& p) {
   model.make = [o](const std::vector<Vent>& vents, const World& world) -> std::unique_ptr<Effect> {
     ModernOptions options = o;
     options.seed = world.seed;
-    return std::make_unique<ModernLavaEffect>(options, vents, *world.terrain, world.obstacles ? *world.obstacles : std::vector<PlacedObstacle>{});
+    return std::make_unique<ModernLavaEffect>(options, vents, *world.terrain, world.obstacles ? *world.obstacles : std::vector<PlacedObstacle>{},
+                                              world.bodies ? *world.bodies : std::vector<PlacedBody>{});
   };
   return model;
 }

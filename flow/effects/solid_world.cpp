@@ -26,7 +26,7 @@ SolidWorld::SolidWorld(const std::vector<PlacedObstacle>& obstacles, const std::
     }
     for (const PlacedBody& each : bodies) {
       ids_.push_back(bodies_->add(each.shape, each.density, each.pose, each.surface, each.velocity, each.spin));
-      friction_.push_back(each.friction);
+      friction_.push_back(each.lava_friction);
       const geometry::CollisionMesh mesh = each.shape->kind() == Shape::Kind::kMesh ? each.shape->collision_mesh() : geometry::CollisionMesh(each.shape->surface());
       obstacles_.add({mesh, RigidMotion(bodies_->body_pose(ids_.back())), each.temperature, static_cast<Index>(tracks_.size() + ids_.size())});
       before_.push_back(bodies_->body_pose(ids_.back()));

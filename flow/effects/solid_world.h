@@ -5,21 +5,10 @@
 
 #include "flow/bodies/rigid_bodies.h"
 #include "flow/scene/obstacles.h"
+#include "flow/scene/rigid_bodies.h"
 #include "flow/sph/solids.h"
 
 namespace effuse::flow {
-
-/// A rigid body of a scene, placed: metres, z up, from the terrain's origin.
-struct PlacedBody {
-  std::string name;
-  std::shared_ptr<const bodies::Shape> shape;
-  Real density = 0;  ///< [kg/m^3]
-  geometry::RigidPose pose;
-  bodies::Surface surface;
-  Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();
-  Real temperature = 0;  ///< of its surface [K]; 0: the ground's
-  Real friction = 1;     ///< of lava on it
-};
 
 /// All that is solid beside the terrain, as one lava meets it: obstacles on their tracks and rigid bodies, which meet one another and
 /// the terrain, too. Lava and bodies move each other: both solves of a lava step hold the bodies' velocities as unknowns beside the

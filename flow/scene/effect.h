@@ -9,6 +9,7 @@
 
 #include "flow/scene/obstacles.h"
 #include "flow/scene/parameters.h"
+#include "flow/scene/rigid_bodies.h"
 #include "geometry/base/hash.h"
 #include "geometry/base/state_io.h"
 #include "geometry/mesh/points.h"
@@ -21,6 +22,7 @@ struct World {
   const geometry::Terrain* terrain = nullptr;
   std::uint64_t seed = 1;
   const std::vector<PlacedObstacle>* obstacles = nullptr;  ///< null: none
+  const std::vector<PlacedBody>* bodies = nullptr;         ///< null: none
 };
 
 /// What an effect is expected to cost: for `effuse check`.
@@ -48,6 +50,8 @@ class Effect {
   virtual Real volume() const { return 0; }
   /// Spacing of the particles [m], 0 without any.
   virtual Real spacing() const { return 0; }
+  /// Where the world's bodies are, in their order, as this effect moves them; empty: it moves none.
+  virtual std::vector<geometry::RigidPose> body_poses() const { return {}; }
   virtual std::size_t memory() const = 0;  ///< bytes held
   virtual void add_to(StateHash& hash) const = 0;
   virtual void save(StateWriter& out) const = 0;

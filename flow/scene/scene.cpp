@@ -23,6 +23,7 @@ Scene read_scene(Parameters& root, std::span<const EffectKind> kinds) {
   scene.ground_temperature = terrain.number("temperature", "K", 288.15, {0, 5000, true}, "of the ground");
 
   scene.obstacles = read_obstacles(root);
+  scene.bodies = read_bodies(root);
 
   for (const EffectKind& kind : kinds) {
     if (!root.has(kind.name)) continue;

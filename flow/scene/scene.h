@@ -22,13 +22,14 @@ struct Scene {
   std::string terrain_crs;      ///< "": as the file says
   Real ground_temperature = 0;  ///< [K]
   std::vector<PlannedObstacle> obstacles;
+  std::vector<PlannedBody> bodies;
   std::vector<EffectPlan> effects;
 
   /// Frame n = 1, 2, ... shows this moment [s].
   Real frame_time(int n) const { return n * time_scale / fps; }
 };
 
-/// Reads the tables [film], [terrain], [[obstacle]] and one for each effect of kinds that the scene names. Faults stay
+/// Reads the tables [film], [terrain], [[obstacle]], [[body]] and one for each effect of kinds that the scene names. Faults stay
 /// in root: the caller reads on and calls root.finish().
 Scene read_scene(Parameters& root, std::span<const EffectKind> kinds);
 

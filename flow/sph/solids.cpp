@@ -20,10 +20,39 @@ Box3 widened(Box3 box, Real by) {
   return {box.min() - Vec3::Constant(by), box.max() + Vec3::Constant(by)};
 }
 
-/// Rays to the half-space beyond a wall's plane: azimuths, and a 2 x 2 midpoint rule over depth and distance from the foot, weighted by
-/// what there adds to the drag along the plane (BoundaryTable's drag_t).
-constexpr int kAzimuths = 8, kParts = 2;
-constexpr Real kRing = 0.7;  // of the plane's circle in reach: where few rays look first
+constexpr std::size_t kBlock = 64;  // particles that ask together first; they lie in memory as in space
+constexpr std::size_t kFew = 16;    // obstacles near a block that each of its particles asks by itself
+
+/// Fills near with the numbers k, rising, of `count` boxes box(k) that meet the box place(obstacle), grown by `by` [m], of any obstacle (or
+/// whose block meets more than kFew).
+template <class BoxOf, class Place>
+void find_near(const geometry::Obstacles& obstacles, std::size_t count, Real by, BoxOf&& box, Place&& place, std::vector<std::uint8_t>& flags, std::vector<Index>& near) {
+  flags.assign(count, 0);
+  const Box3 everything = widened(obstacles.swept_bounds(), by);
+  parallel_ranges(count, kBlock, [&](std::size_t begin, std::size_t end) {
+    Box3 block;
+    for (std::size_t k = begin; k < end; ++k) block.extend(box(k));
+    if (!block.intersects(everything)) return;
+    std::vector<Index> meeting;
+    obstacles.meeting(widened(block, by), meeting);
+    if (meeting.empty()) return;
+    std::array<Box3, kFew> boxes;
+    if (meeting.size() <= kFew)
+      for (std::size_t m = 0; m < meeting.size(); ++m) boxes[m] = widened(place(obstacles[meeting[m]]), by);
+    for (std::size_t k = begin; k < end; ++k)
+      flags[k] = meeting.size() > kFew || std::any_of(boxes.begin(), boxes.begin() + static_cast<std::ptrdiff_t>(meeting.size()), [&](const Box3& b) { return b.intersects(box(k)); });
+  });
+  near.clear();
+  for (std::size_t k = 0; k < count; ++k)
+    if (flags[k]) near.push_back(static_cast<Index>(k));
+}
+
+/// Rays to the half-space beyond a wall's plane, to a ring in the midst of what adds to the drag along the plane (BoundaryTable's drag_t).
+constexpr int kAzimuths = 8;
+constexpr Real kDeep = 0.3;      // of the way from the plane to the end of reach: the ring's depth
+constexpr Real kWide = 0.65;     // of the reach's circle there: its radius
+constexpr Real kDragging = 0.6;  // of the reach: walls further off drag by a few hundredths of what near ones do, edges or not
+constexpr Real kRing = 0.7;      // of the plane's circle in reach: where few rays look first
 
 /// What stands around a particle, for its walls' backing.
 class Backing {
@@ -33,41 +62,39 @@ class Backing {
   /// Share of a wall's half-space that is hidden from x by obstacles, or lies in the ground: 1 but beside convex edges.
   Real share(const Vec3& x, const Contact& wall, std::span<const Wall> ground) {
     const Real d = wall.distance;
-    if (!(d > 0)) return 1;
+    if (!(d > 0 && d < kDragging * reach_)) return 1;
     obstacles_.meeting(Box3(x - Vec3::Constant(reach_), x + Vec3::Constant(reach_)), near_);
     const Vec3 first = wall.normal.unitOrthogonal(), second = wall.normal.cross(first);
-    const auto behind = [&](Real azimuth, Real depth, Real off) {
-      return hidden(x, (off * std::cos(azimuth)) * first + (off * std::sin(azimuth)) * second - depth * wall.normal, ground);
+    const auto behind = [&](Real azimuth, Real depth, Real off, bool deep) {
+      return hidden(x, (off * std::cos(azimuth)) * first + (off * std::sin(azimuth)) * second - depth * wall.normal, ground, deep);
     };
-    const Real circle = std::sqrt(std::max(reach_ * reach_ - d * d, 0.0));
+    const Real circle = std::sqrt(reach_ * reach_ - d * d);
     bool whole = true;
-    for (int a = 0; a < 4 && whole; ++a) whole = behind(a * kPi / 2 + kPi / 7, (1 + kBelow) * d, kRing * circle);
+    for (int a = 0; a < 4 && whole; ++a) whole = behind(a * kPi / 2 + kPi / 7, (1 + kBelow) * d, kRing * circle, false);
     if (whole) return 1;
-    Real hit = 0, all = 0;
-    for (int i = 0; i < kParts; ++i) {
-      const Real depth = d + (i + 0.5) / kParts * (reach_ - d), widest = std::sqrt(reach_ * reach_ - depth * depth);
-      for (int j = 0; j < kParts; ++j) {
-        const Real off = (j + 0.5) / kParts * widest, p = 1 - (depth * depth + off * off) / (reach_ * reach_);
-        const Real weight = p * p * depth * off * off * off * widest;
-        for (int a = 0; a < kAzimuths; ++a) {
-          all += weight;
-          if (behind((a + 0.5) * 2 * kPi / kAzimuths, depth, off)) hit += weight;
-        }
-      }
-    }
-    return all > 0 ? hit / all : 1;
+    const Real depth = d + kDeep * (reach_ - d), off = kWide * std::sqrt(reach_ * reach_ - depth * depth);
+    int hit = 0;
+    for (int a = 0; a < kAzimuths; ++a) hit += behind((a + 0.5) * 2 * kPi / kAzimuths, depth, off, true);
+    return static_cast<Real>(hit) / kAzimuths;
   }
 
  private:
-  static constexpr Real kBelow = 0.01;  // of the distance: just through the plane
+  static constexpr Real kBelow = 0.01;    // of the distance: just through the plane
+  static constexpr Real kFarSide = 0.7;   // cosine between a wall's sides
 
-  bool hidden(const Vec3& x, const Vec3& ray, std::span<const Wall> ground) const {
+  /// deep: a ray that may come out of the solid again.
+  bool hidden(const Vec3& x, const Vec3& ray, std::span<const Wall> ground, bool deep) const {
     for (const Wall& wall : ground)
       if (wall.distance + wall.normal.dot(ray) < 0) return true;
     return std::any_of(near_.begin(), near_.end(), [&](Index k) {
       const geometry::Obstacle& obstacle = obstacles_[k];
       const geometry::RigidPose& pose = obstacle.motion.to();
-      return geometry::sweep(obstacle.shape, pose.body(x), pose.body(x + ray), 0).has_value();
+      const Vec3 from = pose.body(x), to = pose.body(x + ray);
+      const auto in = geometry::sweep(obstacle.shape, from, to, 0);
+      if (!in || !deep) return in.has_value();
+      // Out of the solid again: by its far side (a thin wall, a sheet) or past an edge.
+      const auto out = geometry::sweep(obstacle.shape, to, from, 0);
+      return !out || out->normal.dot(in->normal) < -kFarSide;
     });
   }
 
@@ -141,8 +168,8 @@ void Solids::add_walls(std::span<const Vec3> x, Real reach, Walls& walls) {
   CHECK_EQ(walls.first.size(), x.size() + 1);
   speed_ = 0;
   if (!any()) return;
-  const Box3 box = widened(options_.obstacles->bounds(), reach);
-  select(x.size(), [&](std::size_t k) { return box.contains(x[k]); }, near_);
+  find_near(*options_.obstacles, x.size(), reach, [&](std::size_t k) { return Box3(x[k], x[k]); },
+            [](const geometry::Obstacle& o) { return geometry::placed_box(o.motion.to(), o.shape.bounds()); }, flags_, near_);
   if (near_.empty()) return;
   const std::size_t n = near_.size();
   at_.resize(n);
@@ -197,11 +224,10 @@ bool Solids::disturbs(const Vec3& x, Real reach, Real speed) const {
 geometry::SlideReport Solids::slide(std::span<const Index> which, std::span<const Vec3> before, std::span<Vec3> x, std::span<Vec3> v) {
   ZONE("sph.solids");
   if (!any()) return {};
-  const Box3 box = widened(options_.obstacles->swept_bounds(), radius_);
-  near_.clear();
-  for (const Index i : which)
-    if (box.intersects(Box3(before[i].cwiseMin(x[i]), before[i].cwiseMax(x[i])))) near_.push_back(i);
+  find_near(*options_.obstacles, which.size(), 2 * radius_, [&](std::size_t k) { return Box3(before[which[k]].cwiseMin(x[which[k]]), before[which[k]].cwiseMax(x[which[k]])); },
+            [](const geometry::Obstacle& o) { return o.motion.swept_box(o.shape.bounds()); }, flags_, near_);
   if (near_.empty()) return {};
+  for (Index& k : near_) k = which[k];
   const std::size_t n = near_.size();
   for (auto* array : {&at_, &way_, &speed_at_}) array->resize(n);
   for (std::size_t q = 0; q < n; ++q) {
@@ -221,7 +247,7 @@ geometry::SlideReport Solids::slide(std::span<const Index> which, std::span<cons
 
 std::size_t Solids::memory() const {
   const auto bytes = [](const auto&... vectors) { return ((vectors.capacity() * sizeof(vectors[0])) + ...); };
-  return bytes(near_, at_, way_, speed_at_, contacts_, backing_, count_, merged_.first, merged_.walls);
+  return bytes(near_, at_, way_, speed_at_, contacts_, backing_, count_, flags_, merged_.first, merged_.walls);
 }
 
 }  // namespace effuse::flow::sph

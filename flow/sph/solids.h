@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <span>
@@ -35,11 +36,12 @@ struct SolidOptions {
 
 /// The lava's side of its obstacles: walls for the sums, and moves that go through nothing.
 ///
-/// Unlike the ground it keeps no bounds from step to step: what is near is asked each step, at one box test a particle where
-/// obstacles are far. The same bits on any number of threads.
+/// Unlike the ground it keeps no bounds from step to step: what is near is asked each step, first for the box around 64 particles at a
+/// time: obstacles that are far cost less than a hundredth of a step, were it 10,000 of them. The same bits on any number of threads.
 ///
 /// A wall's drag is that of a half-space; beside the obstacle's convex edges (the end of a wall, the corners of a gap) it counts by the
-/// share of that half-space which the obstacles hide from the particle. In full it would hold lava in a gap six spacings wide back by 13 %.
+/// share of that half-space which the obstacles hide from the particle. In full it would hold back a tenth of what a gap six spacings
+/// wide lets through.
 ///
 /// Known limit: at the inner edges of a vessel the sums still miss a little; lava at rest in it creeps round by 0.08 g spacing^2 / nu.
 class Solids {
@@ -91,6 +93,7 @@ class Solids {
   std::vector<geometry::Contact> contacts_;
   std::vector<Real> backing_;  // of each contact
   std::vector<Index> count_;
+  std::vector<std::uint8_t> flags_;
   Walls merged_;
 };
 

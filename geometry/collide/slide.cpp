@@ -125,6 +125,7 @@ void Sliding::find_touches() {
 
 /// Takes away what approaches of the wish and the velocity. False: the surfaces leave no way.
 bool Sliding::respond() {
+  if (out_.surface == 0 && !scratch_.touches.empty()) out_.surface = at(scratch_.touches.front().obstacle).surface;
   std::vector<HalfSpace>& bounds = scratch_.bounds;
   const auto answer = [&](Vec3& w, const Vec3& surface, const Vec3& n) {
     const Vec3 relative = w - surface;
@@ -325,10 +326,7 @@ Slid Sliding::go(const Vec3& x, const Vec3& dx, const Vec3& v) {
     // What the surfaces do at the end is what it does with them.
     find_touches();
     bounced_ = false;
-    if (!scratch_.touches.empty()) {
-      respond();
-      if (out_.surface == 0 && out_.v != v) out_.surface = at(scratch_.touches.front().obstacle).surface;
-    }
+    if (!scratch_.touches.empty()) respond();
   }
   return out_;
 }

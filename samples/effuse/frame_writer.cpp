@@ -9,7 +9,7 @@
 #include "skin/color/lava_color.h"
 #include "skin/preview/preview.h"
 #include "skin/surface/level_set.h"
-#include "samples/effuse/obstacle_meshes.h"
+#include "samples/effuse/solid_things.h"
 #include "skin/tessellate/make_skin.h"
 
 namespace effuse {
@@ -21,8 +21,8 @@ std::string numbered(const char* stem, int frame, const char* extension) { retur
 }  // namespace
 
 FrameWriter::FrameWriter(const flow::Scene& scene, const skin::SkinSettings& settings, const geometry::Terrain& terrain,
-                         const std::vector<flow::PlacedObstacle>& obstacles, fs::path folder)
-    : scene_(scene), settings_(settings), terrain_(terrain), obstacles_(obstacles), folder_(std::move(folder)) {
+                         const SolidThings& solids, fs::path folder)
+    : scene_(scene), settings_(settings), terrain_(terrain), solids_(solids), folder_(std::move(folder)) {
   if (settings.preview) preview_ = std::make_unique<skin::Preview>(terrain.mesh());
 }
 FrameWriter::~FrameWriter() = default;
@@ -42,8 +42,8 @@ void FrameWriter::write_terrain() {
   ZONE("write.terrain");
   skin::write_ply(folder_ / "terrain.ply", terrain_.mesh(), metadata(0, 0));
   skin::write_glb(folder_ / "terrain.glb", terrain_.mesh(), metadata(0, 0));
-  if (obstacles_.empty()) return;
-  const geometry::TriMesh solids = obstacles_at(obstacles_, scene_.frame_time(1));
+  if (!solids_.any()) return;
+  const geometry::TriMesh solids = solids_.at(scene_.frame_time(1));
   skin::write_ply(folder_ / "obstacles.ply", solids, metadata(0, 0));
   skin::write_glb(folder_ / "obstacles.glb", solids, metadata(0, 0));
 }
@@ -77,8 +77,11 @@ FrameWriter::Result FrameWriter::write_frame(const flow::Simulation& simulation)
   if (settings_.obj) skin::write_obj(frames / numbered("skin", frame, "obj"), mesh, about);
   if (settings_.glb) skin::write_glb(frames / numbered("skin", frame, "glb"), mesh, about);
   if (settings_.vdb) skin::write_vdb(frames / numbered("lava", frame, "vdb"), skin.surface, about);
-  const geometry::TriMesh solids = obstacles_.empty() ? geometry::TriMesh() : obstacles_at(obstacles_, simulation.time());
-  if (settings_.ply && any_moves(obstacles_)) skin::write_ply(frames / numbered("obstacles", frame, "ply"), solids, about);
+  std::vector<geometry::RigidPose> poses;
+  for (const auto& effect : simulation.effects())
+    if (poses.empty()) poses = effect->body_poses();
+  const geometry::TriMesh solids = solids_.at(simulation.time(), poses);
+  if (settings_.ply && solids_.any_moves()) skin::write_ply(frames / numbered("obstacles", frame, "ply"), solids, about);
   if (preview_) {
     const skin::Image image = preview_->render(in_one_picture(mesh, solids), skin::picture_at(settings_, terrain_, frame / scene_.fps));
     skin::write_png(folder_ / "preview" / numbered("preview", frame, "png"), image);
@@ -121,9 +124,9 @@ void FrameWriter::write_manifest(int frames_done, const std::vector<std::pair<st
   m["terrain"] = {{"files", {"terrain.ply", "terrain.glb"}},
                   {"min", {box.min().x(), box.min().y(), box.min().z()}},
                   {"max", {box.max().x(), box.max().y(), box.max().z()}}};
-  if (!obstacles_.empty()) m["obstacles"] = {{"files", {"obstacles.ply", "obstacles.glb"}}};
+  if (solids_.any()) m["obstacles"] = {{"files", {"obstacles.ply", "obstacles.glb"}}};
   ordered_json files = ordered_json::object();
-  if (settings_.ply && any_moves(obstacles_)) files["obstacles"] = "frames/obstacles.####.ply";
+  if (settings_.ply && solids_.any_moves()) files["obstacles"] = "frames/obstacles.####.ply";
   if (settings_.ply) files["ply"] = "frames/skin.####.ply";
   if (settings_.obj) files["obj"] = "frames/skin.####.obj";
   if (settings_.glb) files["glb"] = "frames/skin.####.glb";

@@ -8,6 +8,7 @@
 
 #include "flow/scene/scene.h"
 #include "flow/scene/simulation.h"
+#include "samples/effuse/solid_things.h"
 #include "geometry/terrain/terrain.h"
 #include "skin/scene/skin_settings.h"
 #include "skin/write/write_mesh.h"
@@ -19,7 +20,7 @@ namespace effuse {
 /// writes the bytes it would have.
 class FrameWriter {
  public:
-  FrameWriter(const flow::Scene& scene, const skin::SkinSettings& settings, const geometry::Terrain& terrain, const std::vector<flow::PlacedObstacle>& obstacles,
+  FrameWriter(const flow::Scene& scene, const skin::SkinSettings& settings, const geometry::Terrain& terrain, const SolidThings& solids,
               std::filesystem::path folder);
   ~FrameWriter();
 
@@ -48,7 +49,7 @@ class FrameWriter {
   const flow::Scene& scene_;
   const skin::SkinSettings& settings_;
   const geometry::Terrain& terrain_;
-  const std::vector<flow::PlacedObstacle>& obstacles_;
+  const SolidThings& solids_;
   std::filesystem::path folder_;
   std::unique_ptr<skin::Preview> preview_;
   skin::SurfaceCache last_;  // saves work, changes nothing

@@ -9,13 +9,13 @@
 #include "importers/terrain/import_terrain.h"
 #include "samples/effuse/flow_writer.h"
 #include "samples/effuse/misspelt.h"
-#include "samples/effuse/obstacle_meshes.h"
+#include "samples/effuse/solid_things.h"
 
 namespace effuse {
 
 namespace {
 /// The tables that decide the state of frame n, whatever the number of frames and the files made of it.
-std::string state_key(const flow::Node& resolved, const geometry::Terrain& terrain, const std::vector<flow::PlacedObstacle>& obstacles) {
+std::string state_key(const flow::Node& resolved, const geometry::Terrain& terrain, const SolidThings& solids) {
   StateHash hash;
   for (const auto& [name, value] : resolved.entries) {
     if (name == "skin" || name == "output" || name == "preview" || name == "name") continue;
@@ -24,11 +24,12 @@ std::string state_key(const flow::Node& resolved, const geometry::Terrain& terra
     if (name == "film") copy.set("frames", flow::Node{});
     // What files hold counts, not where they lie.
     if (name == "terrain") copy.set("file", flow::Node{});
-    if (name == "obstacle")
+    if (name == "obstacle" || name == "body")
       for (flow::Node& one : copy.items) one.set("file", flow::Node{});
     hash.add(importers::to_toml(part));
   }
-  for (const flow::PlacedObstacle& each : obstacles) hash.add(std::span<const Vec3>(each.shape.mesh().positions));
+  for (const flow::PlacedObstacle& each : solids.obstacles) hash.add(std::span<const Vec3>(each.shape.mesh().positions));
+  for (const flow::PlacedBody& each : solids.bodies) hash.add(std::span<const Vec3>(each.mesh.positions));
   hash.add(std::span<const Vec3>(terrain.mesh().positions));
   hash.add(terrain.georeference().origin.x());
   hash.add(terrain.georeference().origin.y());
@@ -68,13 +69,16 @@ std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const
       for (const Fault& fault : error.faults()) faults.push_back({scene.terrain_place, to_string(fault)});
     }
   }
-  if (loaded->terrain) loaded->obstacles = load_obstacles(scene, file.parent_path(), *loaded->terrain, faults, loaded->notes);
+  if (loaded->terrain) {
+    loaded->solids.obstacles = load_obstacles(scene, file.parent_path(), *loaded->terrain, faults, loaded->notes);
+    loaded->solids.bodies = load_bodies(scene, file.parent_path(), *loaded->terrain, faults, loaded->notes);
+  }
   if (!faults.empty() && loaded->terrain) {
     for (const flow::EffectPlan& plan : scene.effects)
-      for (const Fault& fault : plan.misfits(flow::World{&*loaded->terrain, scene.seed, &loaded->obstacles})) faults.push_back(fault);
+      for (const Fault& fault : plan.misfits(flow::World{&*loaded->terrain, scene.seed, &loaded->solids.obstacles, &loaded->solids.bodies})) faults.push_back(fault);
   }
   if (faults.empty() && loaded->terrain) {
-    loaded->simulation = std::make_unique<flow::Simulation>(scene, flow::World{&*loaded->terrain, scene.seed, &loaded->obstacles});
+    loaded->simulation = std::make_unique<flow::Simulation>(scene, flow::World{&*loaded->terrain, scene.seed, &loaded->solids.obstacles, &loaded->solids.bodies});
     check_map(loaded->skin, *loaded->terrain, *loaded->simulation);
     skin::check_camera(loaded->skin, *loaded->terrain, scene.frames, scene.fps);
     flow::Node resolved = root.resolved();
@@ -87,12 +91,12 @@ std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const
     };
     for (auto& [name, table] : resolved.entries) {
       if (name == "terrain") table.set("file", whole(terrain_path));
-      if (name != "obstacle") continue;
+      if (name != "obstacle" && name != "body") continue;
       for (flow::Node& one : table.items)
         if (const flow::Node* path = one.find("file")) one.set("file", whole(std::filesystem::absolute(file.parent_path() / path->text).lexically_normal()));
     }
     loaded->resolved = importers::to_toml(resolved);
-    loaded->key = state_key(resolved, *loaded->terrain, loaded->obstacles);
+    loaded->key = state_key(resolved, *loaded->terrain, loaded->solids);
   }
   if (!faults.empty()) {
     std::vector<std::string> effects;

@@ -9,6 +9,7 @@
 #include "flow/scene/scene.h"
 #include "flow/scene/simulation.h"
 #include "geometry/terrain/terrain.h"
+#include "samples/effuse/solid_things.h"
 #include "skin/scene/skin_settings.h"
 
 namespace effuse {
@@ -20,7 +21,7 @@ struct LoadedScene {
   std::string resolved;  ///< TOML, every default filled in
   std::string key;       ///< hash of what the simulation's state depends on: for checkpoints
   std::optional<geometry::Terrain> terrain;
-  std::vector<flow::PlacedObstacle> obstacles;  ///< the simulation refers to them
+  SolidThings solids;  ///< the simulation refers to them
   std::vector<std::string> notes;  ///< of the imports
   std::unique_ptr<flow::Simulation> simulation;
 };

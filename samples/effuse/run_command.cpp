@@ -256,7 +256,7 @@ ExitCode run(const RunCommand& command, const CommonOptions& common) {
     remove_run(folder);
   }
 
-  FrameWriter writer(scene, loaded->skin, *loaded->terrain, loaded->obstacles, folder);
+  FrameWriter writer(scene, loaded->skin, *loaded->terrain, loaded->solids, folder);
   write_file(folder / "scene.toml", loaded->resolved);
   writer.write_terrain();
 

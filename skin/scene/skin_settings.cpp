@@ -89,6 +89,8 @@ SkinSettings read_skin_settings(flow::Parameters& root) {
                                                             "particles are averaged with spheres, or with ellipsoids that follow the surface: flatter, sharper fronts, slower"));
   if (level_set.kernel == SurfaceKernel::kAnisotropic) level_set.smoothing = 0;
   level_set.smoothing = static_cast<int>(skin.integer("smoothing", level_set.smoothing, 0, 20, "passes of mean-curvature flow"));
+  if (!(level_set.influence > level_set.radius + 1))
+    skin.fault(skin.has("influence") ? "influence" : "radius", fmt::format("influence {:g} with radius {:g}: wanted an influence of more than the radius and one spacing", level_set.influence, level_set.radius));
   level_set.drop_volume = skin.number("drop_volume", "", level_set.drop_volume, Parameters::not_negative(), "pieces of fewer particles are left out");
   level_set.match_volume = skin.flag("match_volume", level_set.match_volume, "enclose the particles' volume");
   s.tessellation = static_cast<TessellationKind>(skin.choice("tessellation", {kTessellationNames.begin(), kTessellationNames.end()}, static_cast<std::size_t>(s.tessellation),

@@ -323,7 +323,7 @@ struct Warm {
     obstacles.update();
     ModernOptions o = on_the_slope(kSpacing);
     o.gravity.setZero();
-    o.max_step = 20;
+    o.max_step = 200;
     o.period = Vec2(0, 6 * kSpacing);
     o.heat.on = true;
     o.heat.viscous_heating = false;
@@ -359,7 +359,7 @@ TEST(Barrier, ColdWallsTakeWhatTwoHalfSpacesExchangeAndHotOnesGiveIt) {
     const HeatOptions& heat = warm.lava.options().heat;
     const Real before = warm.lava.heat().total_enthalpy();
     const Real b_lava = std::sqrt(heat.conductivity * kDensity * heat.curve.heat_capacity);
-    for (const Real t : {500.0, 5000.0, 50000.0}) {
+    for (const Real t : {1000.0, 10000.0, 40000.0}) {
       warm.run(t);
       const Real exact = warm.area() * 2 * (1450 - wall) / (1 / b_lava + 1 / heat.ground_effusivity) * std::sqrt(t / kPi);
       EXPECT_NEAR(warm.budget.ground, exact, 0.1 * std::abs(exact)) << "wall at " << wall << " K, " << t << " s";

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "flow/scene/obstacles.h"
+#include "flow/scene/rigid_bodies.h"
 #include "flow/scene/scene.h"
 #include "geometry/mesh/tri_mesh.h"
 
@@ -14,9 +15,19 @@ namespace effuse {
 std::vector<flow::PlacedObstacle> load_obstacles(const flow::Scene& scene, const std::filesystem::path& folder, const geometry::Terrain& terrain, std::vector<Fault>& faults,
                                                  std::vector<std::string>& notes);
 
-/// All obstacles where they are at a time, as one mesh; edges are sharp.
-geometry::TriMesh obstacles_at(const std::vector<flow::PlacedObstacle>& obstacles, Real time);
-bool any_moves(const std::vector<flow::PlacedObstacle>& obstacles);
+/// The same for its rigid bodies.
+std::vector<flow::PlacedBody> load_bodies(const flow::Scene& scene, const std::filesystem::path& folder, const geometry::Terrain& terrain, std::vector<Fault>& faults,
+                                          std::vector<std::string>& notes);
+
+/// What is solid in a scene, beside the terrain.
+struct SolidThings {
+  std::vector<flow::PlacedObstacle> obstacles;
+  std::vector<flow::PlacedBody> bodies;
+  bool any() const { return !obstacles.empty() || !bodies.empty(); }
+  bool any_moves() const;
+  /// All where they are at a time [s], as one mesh; edges are sharp. poses: of the bodies; empty: where the scene puts them.
+  geometry::TriMesh at(Real time, const std::vector<geometry::RigidPose>& poses = {}) const;
+};
 
 /// Lava and obstacles for one picture: these in the grey of concrete, cold and dull.
 geometry::TriMesh in_one_picture(geometry::TriMesh lava, const geometry::TriMesh& obstacles);

@@ -1,4 +1,4 @@
-#include "samples/effuse/obstacle_meshes.h"
+#include "samples/effuse/solid_things.h"
 
 #include <fmt/format.h>
 
@@ -31,11 +31,30 @@ std::vector<flow::PlacedObstacle> load_obstacles(const flow::Scene& scene, const
   return placed;
 }
 
-geometry::TriMesh obstacles_at(const std::vector<flow::PlacedObstacle>& obstacles, Real time) {
+std::vector<flow::PlacedBody> load_bodies(const flow::Scene& scene, const std::filesystem::path& folder, const geometry::Terrain& terrain, std::vector<Fault>& faults,
+                                          std::vector<std::string>& notes) {
+  std::vector<flow::PlacedBody> placed;
+  for (const flow::PlannedBody& plan : scene.bodies) {
+    if (plan.file.empty()) continue;  // told already
+    const std::filesystem::path path = std::filesystem::path(plan.file).is_relative() ? folder / plan.file : std::filesystem::path(plan.file);
+    try {
+      const std::size_t before = placed.size();
+      flow::place_body(plan, importers::import_mesh(path).mesh, terrain, placed, faults);
+      if (placed.size() > before) notes.push_back(fmt::format("body '{}': {:.4g} m3, {:.4g} kg", plan.name, placed.back().shape->volume(), placed.back().shape->volume() * plan.density));
+    } catch (const InputError& error) {
+      for (const Fault& fault : error.faults()) faults.push_back({plan.file_place, to_string(fault)});
+    }
+  }
+  return placed;
+}
+
+bool SolidThings::any_moves() const {
+  return !bodies.empty() || std::any_of(obstacles.begin(), obstacles.end(), [](const flow::PlacedObstacle& each) { return each.track.keys().size() > 1; });
+}
+
+geometry::TriMesh SolidThings::at(Real time, const std::vector<geometry::RigidPose>& poses) const {
   geometry::TriMesh all;
-  for (const flow::PlacedObstacle& each : obstacles) {
-    const geometry::RigidPose pose = each.track.at(time);
-    const geometry::TriMesh& mesh = each.shape.mesh();
+  const auto add = [&](const geometry::TriMesh& mesh, const geometry::RigidPose& pose) {
     for (const geometry::Triangle& t : mesh.triangles) {
       const Vec3 a = pose.world(mesh.positions[t[0]]), b = pose.world(mesh.positions[t[1]]), c = pose.world(mesh.positions[t[2]]);
       const Vec3 n = (b - a).cross(c - a).normalized();
@@ -46,12 +65,10 @@ geometry::TriMesh obstacles_at(const std::vector<flow::PlacedObstacle>& obstacle
         all.normals.push_back(n);
       }
     }
-  }
+  };
+  for (const flow::PlacedObstacle& each : obstacles) add(each.shape.mesh(), each.track.at(time));
+  for (std::size_t b = 0; b < bodies.size(); ++b) add(bodies[b].mesh, b < poses.size() ? poses[b] : bodies[b].pose);
   return all;
-}
-
-bool any_moves(const std::vector<flow::PlacedObstacle>& obstacles) {
-  return std::any_of(obstacles.begin(), obstacles.end(), [](const flow::PlacedObstacle& each) { return each.track.keys().size() > 1; });
 }
 
 geometry::TriMesh in_one_picture(geometry::TriMesh lava, const geometry::TriMesh& obstacles) {
