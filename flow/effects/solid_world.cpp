@@ -25,9 +25,10 @@ SolidWorld::SolidWorld(const std::vector<PlacedObstacle>& obstacles, const std::
       driven_.push_back(each.track.keys().size() > 1 ? bodies_->add_driven(shape, each.track.at(0)) : bodies_->add_static(shape, each.track.at(0)));
     }
     for (const PlacedBody& each : bodies) {
-      ids_.push_back(bodies_->add(each.shape, each.density, each.pose, each.surface, each.velocity, each.spin));
+      const auto shape = each.hull ? Shape::hull(each.mesh) : Shape::mesh(each.mesh);
+      ids_.push_back(bodies_->add(shape, each.density, each.pose, {.friction = each.friction, .restitution = each.restitution}, each.velocity, each.spin));
       friction_.push_back(each.lava_friction);
-      const geometry::CollisionMesh mesh = each.shape->kind() == Shape::Kind::kMesh ? each.shape->collision_mesh() : geometry::CollisionMesh(each.shape->surface());
+      const geometry::CollisionMesh mesh = shape->kind() == Shape::Kind::kMesh ? shape->collision_mesh() : geometry::CollisionMesh(shape->surface());
       obstacles_.add({mesh, RigidMotion(bodies_->body_pose(ids_.back())), each.temperature, static_cast<Index>(tracks_.size() + ids_.size())});
       before_.push_back(bodies_->body_pose(ids_.back()));
     }

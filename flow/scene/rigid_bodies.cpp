@@ -5,6 +5,9 @@
 #include <filesystem>
 
 #include "flow/scene/placing.h"
+#include "geometry/collide/collision_mesh.h"
+#include "geometry/collide/convex_hull.h"
+#include "geometry/mesh/mass_properties.h"
 
 namespace effuse::flow {
 
@@ -29,8 +32,8 @@ std::vector<PlannedBody> read_bodies(Parameters& root) {
     };
     plan.velocity = vector("velocity", "m/s", "at the start");
     plan.spin = vector("spin", "rad/s", "at the start, about its centre of mass");
-    plan.surface.friction = p.number("friction", "", plan.surface.friction, {0, 100}, "Coulomb's number, against bodies, obstacles and the ground");
-    plan.surface.restitution = p.number("restitution", "", plan.surface.restitution, {0, 1}, "of the speed of an impact that is given back");
+    plan.friction = p.number("friction", "", plan.friction, {0, 100}, "Coulomb's number, against bodies, obstacles and the ground");
+    plan.restitution = p.number("restitution", "", plan.restitution, {0, 1}, "of the speed of an impact that is given back");
     plan.temperature = p.number("temperature", "K", plan.temperature, {0, 5000}, "of its surface; 0: the ground's");
     plan.lava_friction = p.number("lava_friction", "", plan.lava_friction, {0, 1}, "of lava on it: 1 no slip, 0 free slip");
     plans.push_back(std::move(plan));
@@ -43,7 +46,9 @@ void place_body(const PlannedBody& plan, geometry::TriMesh mesh, const geometry:
   body.name = plan.name;
   body.pose = plan.pose;
   body.density = plan.density;
-  body.surface = plan.surface;
+  body.hull = plan.hull;
+  body.friction = plan.friction;
+  body.restitution = plan.restitution;
   body.velocity = plan.velocity;
   body.spin = plan.spin;
   body.temperature = plan.temperature;
@@ -52,8 +57,9 @@ void place_body(const PlannedBody& plan, geometry::TriMesh mesh, const geometry:
   body.mesh = upright(std::move(mesh), plan.scale, plan.y_up);
   if (too_large(body.mesh, fmt::format("body '{}'", plan.name), plan.file_place, faults)) return;
   try {
-    body.shape = plan.hull ? bodies::Shape::hull(body.mesh) : bodies::Shape::mesh(body.mesh);
-    if (!body.shape->solid()) throw InputError(Place{}, "the mesh is not closed, so that it has no mass: shape = \"hull\" would do");
+    if (!plan.hull && !geometry::CollisionMesh(body.mesh).solid()) throw InputError(Place{}, "the mesh is not closed, so that it has no mass: shape = \"hull\" would do");
+    body.volume = geometry::mass_properties(plan.hull ? geometry::mesh_of(geometry::make_convex_hull(body.mesh.positions)) : body.mesh).volume;
+    if (!(body.volume > 0)) throw InputError(Place{}, "the mesh encloses no volume");
     placed.push_back(std::move(body));
   } catch (const InputError& error) {
     for (const Fault& fault : error.faults()) faults.push_back({plan.file_place, fmt::format("body '{}': {}", plan.name, fault.message)});

@@ -1,11 +1,11 @@
 #pragma once
 
-#include <memory>
 #include <string>
 #include <vector>
 
-#include "flow/bodies/rigid_bodies.h"
 #include "flow/scene/parameters.h"
+#include "geometry/collide/rigid_pose.h"
+#include "geometry/mesh/tri_mesh.h"
 #include "geometry/terrain/terrain.h"
 
 namespace effuse::flow {
@@ -22,7 +22,7 @@ struct PlannedBody {
   geometry::RigidPose pose;  ///< in the terrain file's coordinates
   Real density = 0;       ///< [kg/m^3]
   Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();
-  bodies::Surface surface;
+  Real friction = 0.5, restitution = 0;  ///< against bodies, obstacles and the ground
   Real temperature = 0;   ///< [K]; 0: the ground's
   Real lava_friction = 1; ///< of lava on it: 1 no slip, 0 free slip
 };
@@ -33,11 +33,12 @@ std::vector<PlannedBody> read_bodies(Parameters& root);
 /// A body in the world: metres, z up, from the terrain's origin.
 struct PlacedBody {
   std::string name;
-  std::shared_ptr<const bodies::Shape> shape;
-  geometry::TriMesh mesh;  ///< in the frame that pose places, for pictures and files
+  geometry::TriMesh mesh;  ///< in the frame that pose places; closed, or its hull stands for it
+  bool hull = true;
+  Real volume = 0;         ///< of what stands for it [m^3]
   Real density = 0;
   geometry::RigidPose pose;
-  bodies::Surface surface;
+  Real friction = 0.5, restitution = 0;
   Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();
   Real temperature = 0;
   Real lava_friction = 1;

@@ -40,7 +40,7 @@ std::vector<flow::PlacedBody> load_bodies(const flow::Scene& scene, const std::f
     try {
       const std::size_t before = placed.size();
       flow::place_body(plan, importers::import_mesh(path).mesh, terrain, placed, faults);
-      if (placed.size() > before) notes.push_back(fmt::format("body '{}': {:.4g} m3, {:.4g} kg", plan.name, placed.back().shape->volume(), placed.back().shape->volume() * plan.density));
+      if (placed.size() > before) notes.push_back(fmt::format("body '{}': {:.4g} m3, {:.4g} kg", plan.name, placed.back().volume, placed.back().volume * plan.density));
     } catch (const InputError& error) {
       for (const Fault& fault : error.faults()) faults.push_back({plan.file_place, to_string(fault)});
     }

@@ -14,7 +14,6 @@
 namespace effuse::flow {
 namespace {
 
-using bodies::Shape;
 using geometry::CollisionMesh;
 using geometry::RigidPose;
 using geometry::TriMesh;
@@ -50,7 +49,7 @@ PlacedObstacle tray(const Vec3& size) {
 PlacedBody block(const Vec3& half, Real density, const Vec3& at) {
   PlacedBody body;
   body.name = "block";
-  body.shape = Shape::box(half);
+  body.mesh = geometry::make_box(-half, half);
   body.density = density;
   body.pose.position = at;
   return body;
