@@ -19,7 +19,8 @@ struct PairSurface {
 ///   warm_start  the impulses of the last substep once more
 ///   solve       one round over all places, in order: friction within the cone, then the normal. `push`: take overlap away, too, by a
 ///               soft constraint of frequency 1 / (4 h) and ten times critical damping
-///   penalty     instead of all these: spring and damper
+///   penalty     instead of these: spring and damper, by the speeds of the last substep's end
+///   rub_all     with penalty: one round of friction, after all other forces, so that what rests does not creep
 ///   rebound     at the look's end
 class ContactSolver {
  public:
@@ -36,6 +37,7 @@ class ContactSolver {
   void warm_start();
   void solve(bool push);
   void penalty();
+  void rub_all();
   void rebound();
   /// Impulses back into the points; the deepest overlap where the bodies were at the last prepare().
   Real finish();
