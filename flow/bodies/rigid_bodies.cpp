@@ -23,13 +23,18 @@ RigidPose inverse(const RigidPose& p) { return {-(p.orientation.conjugate() * p.
 
 }  // namespace
 
+Real penalty_step_limit(const BodyOptions& o, Real springs) {
+  const Real zeta = o.penalty_damping;
+  return 2 * (std::sqrt(zeta * zeta + 1 / springs) - zeta) / (2 * kPi * o.penalty_frequency);
+}
+
 RigidBodies::RigidBodies(const BodyOptions& o, std::optional<geometry::Terrain> terrain) : impl_(std::make_unique<Impl>(o, std::move(terrain))) {
   CHECK(o.gravity.allFinite());
   CHECK(o.step > 0 && std::isfinite(o.step));
   CHECK_GE(o.substeps, 1);
   CHECK_GE(o.iterations, 1);
   CHECK_GE(o.max_looks, 1);
-  CHECK(o.penalty_frequency > 0 && o.penalty_damping >= 0);
+  CHECK(o.penalty_frequency > 0 && std::isfinite(o.penalty_frequency) && o.penalty_damping >= 0 && std::isfinite(o.penalty_damping) && o.penalty_springs > 0);
   CHECK(o.restitution_speed >= 0 && o.push_speed > 0 && o.margin > 0);
   CHECK(o.terrain_friction >= 0 && o.terrain_restitution >= 0 && o.terrain_restitution <= 1);
   CHECK(o.sleep_speed >= 0 && o.sleep_delay >= 0);
@@ -95,8 +100,8 @@ void RigidBodies::move_to(BodyId id, const RigidPose& pose) {
 
 JointId RigidBodies::join(const Joint& joint) {
   Impl& m = *impl_;
-  CHECK_LT(joint.a, m.size());
-  CHECK_LT(joint.b, m.size());
+  for (const BodyId end : {joint.a, joint.b})
+    if (end != Joint::kWorld) CHECK_LT(end, m.size());
   m.joints.push_back(make_joint_state(joint, m.solver_body(joint.a), m.solver_body(joint.b)));
   m.wake_group(joint.a);
   m.wake_group(joint.b);
@@ -126,6 +131,7 @@ void RigidBodies::unjoin(JointId joint) {
 }
 
 void RigidBodies::Impl::wake_group(Index i) {
+  if (i == Joint::kWorld) return;
   const std::uint64_t g = group[i];
   rested[i] = 0;
   if (g == 0) return;
@@ -138,6 +144,7 @@ void RigidBodies::Impl::wake_group(Index i) {
 
 SolverBody RigidBodies::Impl::solver_body(Index i) const {
   SolverBody b;
+  if (i == Joint::kWorld) return b;
   b.x = x[i];
   b.q = q[i];
   b.keeps_axes = shape[i]->kind() == Shape::Kind::kSphere;
@@ -453,7 +460,8 @@ void RigidBodies::load(StateReader& in) {
       joint.broken = broken[j] != 0;
       joint.joint.a = joined[2 * j];
       joint.joint.b = joined[2 * j + 1];
-      if (joint.joint.a >= n || joint.joint.b >= n) refuse("has a joint of a body that is not there");
+      for (const BodyId end : {joint.joint.a, joint.joint.b})
+        if (end >= n && end != Joint::kWorld) refuse("has a joint of a body that is not there");
       const Real* f = frames.data() + kFrames * j;
       joint.anchor_a = Vec3(f[0], f[1], f[2]);
       joint.anchor_b = Vec3(f[3], f[4], f[5]);

@@ -20,7 +20,7 @@ namespace effuse::flow::bodies {
 /// How bodies are kept out of each other.
 ///   kConstraint  impulses that solve for the velocities: stiff, any step
 ///   kPenalty     a spring and a damper at each place of contact, as the jello lecture has it: soft, and the substep
-///                must resolve the spring
+///                must resolve the spring (penalty_step_limit): more are made where there are too few
 enum class ContactModel { kConstraint, kPenalty };
 inline constexpr std::string_view kContactModelNames[] = {"constraint", "penalty"};
 
@@ -31,8 +31,9 @@ struct BodyOptions {
   int iterations = 1;          ///< over the contacts, in a substep; where masses differ by 10^n, n more (at most 4)
   RotorScheme rotor = RotorScheme::kSplitting;
   ContactModel contact = ContactModel::kConstraint;
-  Real penalty_frequency = 60; ///< [1/s] of the penalty spring, with the reduced mass at the place
-  Real penalty_damping = 0.5;  ///< of critical
+  Real penalty_frequency = 60; ///< f [1/s] of the penalty spring: k = m (2 pi f)^2 with the reduced mass at the place
+  Real penalty_damping = 0.5;  ///< zeta, of critical: d = 2 zeta m 2 pi f
+  Real penalty_springs = 4;    ///< so many of them may push a body the same way, as far as the substep goes
   Real restitution_speed = 0.5;  ///< [m/s]: slower impacts do not rebound
   Real push_speed = 3;         ///< [m/s]: overlap is taken away no faster
   Real margin = 0.02;          ///< contacts are made this far ahead, in bounding radii (and as far as the speed asks)
@@ -41,6 +42,15 @@ struct BodyOptions {
   Real sleep_delay = 0.5;      ///< [s]
   int max_looks = 32;          ///< at most so many looks for contacts a step of fast bodies (see RigidBodies)
 };
+
+/// The longest stable substep h [s] of a body on n penalty springs that push the same way:
+///   (omega h)^2 + 4 zeta omega h = 4 / n,   omega = 2 pi f.
+/// Symplectic Euler with the damper taken explicitly,
+///   v' = v - h n (omega^2 x + 2 zeta omega v),   x' = x + h v',
+/// has the characteristic polynomial  l^2 - (2 - n (2 zeta omega h + omega^2 h^2)) l + (1 - 2 n zeta omega h),  whose roots stay
+/// inside the unit circle below that. One box on the ground counts 1.5 (it rocks), a stack of them 3. At rest a spring
+/// holds mass m at the depth m g / k = g / omega^2.
+Real penalty_step_limit(const BodyOptions& options, Real springs);
 
 /// Of a body's surface. Two in contact: the geometric mean of friction, the larger restitution and rolling.
 struct Surface {

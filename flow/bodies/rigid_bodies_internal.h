@@ -77,12 +77,13 @@ struct RigidBodies::Impl {
 
   BodyReport run(Real dt, int looks);
   void look(Real dt, int number, int looks, BodyReport& report);
+  int substeps_of(Real look) const;
   void place_bodies(Real dt);
   void find_contacts();
   bool wake_touched(Real dt);
   PairSurface pair_surface(const ContactPoint& c) const;
   void solve(Real dt, int number, std::vector<Island>& islands, BodyReport& report);
-  Real solve_island(const Island& island, Real h, int first_substep, std::vector<ContactLoad>& loads_out);
+  Real solve_island(const Island& island, Real h, int substeps, int first_substep, std::vector<ContactLoad>& loads_out);
   int more_iterations(std::span<const ContactPoint> places) const;
   void go_on(const Island& island, JointSolver& linkage, int k, Real h);
   void stop_fast(const std::vector<Vec3>& before, Real s0, Real s1, BodyReport& report);

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "flow/scene/joints.h"
 #include "flow/scene/obstacles.h"
 #include "flow/scene/parameters.h"
 #include "flow/scene/rigid_bodies.h"
@@ -23,6 +24,8 @@ struct World {
   std::uint64_t seed = 1;
   const std::vector<PlacedObstacle>* obstacles = nullptr;  ///< null: none
   const std::vector<PlacedBody>* bodies = nullptr;         ///< null: none
+  const std::vector<PlacedJoint>* joints = nullptr;        ///< null: none
+  BodySettings body_settings = {};
 };
 
 /// What an effect is expected to cost: for `effuse check`.
@@ -78,6 +81,8 @@ struct EffectKind {
   std::string what;
   /// Reads the table; faults stay in parameters. duration: simulated time of the scene [s].
   EffectPlan (*read)(Parameters& parameters, Real duration);
+  /// It steps the scene's bodies and obstacles where no other effect meets them; its table is then there without being written.
+  bool of_solids = false;
 };
 
 }  // namespace effuse::flow
