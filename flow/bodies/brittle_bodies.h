@@ -73,6 +73,13 @@ class BrittleBodies {
   const BrittleMaterial& material(Index source) const { return sources_[source].material; }
   /// The body that source was added as.
   BodyId first_body(Index source) const { return sources_[source].first; }
+  /// Of a piece that came by breaking, also one that broke again: the body it was part of, and its source.
+  struct Birth {
+    BodyId parent;
+    Index source;
+    std::vector<Index> cells;
+  };
+  const Birth& birth(BodyId piece) const { return births_.at(piece); }
   std::size_t broken_bonds() const;
 
   void add_to(StateHash& hash) const;
@@ -100,11 +107,6 @@ class BrittleBodies {
   struct Split {
     BodyId body;
     std::vector<std::vector<Index>> groups;
-  };
-  struct Birth {
-    BodyId parent;
-    Index source;
-    std::vector<Index> cells;
   };
   std::shared_ptr<const Shape> shape_of(const Source& source, std::span<const Index> cells) const;
   BodyId add_piece(Index source, std::vector<Index> cells, const geometry::RigidPose& pose, const Vec3& velocity, const Vec3& spin);

@@ -306,12 +306,25 @@ void collide_terrain(Index a, const PlacedShape& A, const GroundShape& ground, s
   Probe p;
   if (!ask(A.x, bound + A.margin, p) && terrain.bounds().contains(A.x)) return;
   const bool fine = ground.finer_than(2 * bound);
-  const std::vector<Vec3>& samples = A.shape->samples();
-  const std::size_t count = fine ? samples.size() : A.shape->corners();
-  for (std::size_t i = 0; i < count; ++i)
-    if (ask(A.x + A.R * samples[i], A.margin, p)) found.push_back(p);
-  thin_out(found);
-  append_probes(a, A, kTerrain, nullptr, found, true, out);
+  if (A.shape->kind() == Kind::kParts) {
+    // Each part stands on its own corners: a wall on five places in all would be loaded as no wall is.
+    for (std::size_t k = 0; k < A.hulls.size(); ++k) {
+      const Vec3 middle = A.boxes[k].center();
+      if (!ask(middle, A.boxes[k].diagonal().norm() / 2 + A.margin, p) && terrain.bounds().contains(middle)) continue;
+      found.clear();
+      for (const Vec3& corner : A.hulls[k].vertices)
+        if (ask(corner, A.margin, p)) found.push_back(p);
+      thin_out(found);
+      append_probes(a, A, kTerrain, nullptr, found, true, out);
+    }
+  } else {
+    const std::vector<Vec3>& samples = A.shape->samples();
+    const std::size_t count = fine ? samples.size() : A.shape->corners();
+    for (std::size_t i = 0; i < count; ++i)
+      if (ask(A.x + A.R * samples[i], A.margin, p)) found.push_back(p);
+    thin_out(found);
+    append_probes(a, A, kTerrain, nullptr, found, true, out);
+  }
   if (!fine) return;
 
   // Points of the ground that stick into the body.
