@@ -185,8 +185,7 @@ Real longest_stable_step(Scheme scheme, const SpringSystem::Spectrum& spectrum) 
 std::size_t SpringSystem::memory() const {
   std::size_t bytes = impl_->half.capacity() * sizeof(HalfSpring) + impl_->first.capacity() * sizeof(std::size_t);
   if (const ImplicitSolve* s = impl_->implicit.get())
-    bytes += static_cast<std::size_t>(s->hessian.nonZeros()) * 12 + static_cast<std::size_t>(s->factor.matrixL().nestedExpression().nonZeros()) * 12 +
-             (s->start.capacity() + s->target.capacity() + s->trial.capacity() + s->direction.capacity()) * sizeof(Vec3);
+    bytes += s->newton.memory() + (s->start.capacity() + s->target.capacity() + s->direction.capacity()) * sizeof(Vec3);
   return bytes;
 }
 

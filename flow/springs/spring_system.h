@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "flow/integrate/block_newton.h"
 #include "flow/integrate/integrate.h"
 #include "flow/springs/spring_network.h"
 #include "geometry/motion/force_grid.h"
@@ -40,11 +41,7 @@ struct Surroundings {
 /// How the implicit step is solved.
 struct ImplicitOptions {
   int max_iterations = 50;  ///< of Newton's method
-  Real tolerance = 1e-10;   ///< of the last move over the mean rest length
-};
-struct ImplicitReport {
-  int iterations = 0;
-  bool converged = true;
+  Real tolerance = 1e-8;    ///< of the last move over the mean rest length
 };
 
 /// The rates of a network's state, for every scheme of flow/integrate. Keeps to the network it was made of until torn.
@@ -71,7 +68,7 @@ class SpringSystem {
   void position_rates(Real t, const SpringState& y, SpringState& k) const;
   void rates(Real t, const SpringState& y, SpringState& k) const;
   void implicit_euler(Real t, Real dt, SpringState& y);
-  ImplicitReport implicit_report() const;
+  BlockNewton::Report implicit_report() const;  ///< of the last implicit step
 
   /// Fastest oscillation omega and fastest decay gamma [1/s] about the state, of springs, walls, contacts and drag: largest
   /// eigenvalues of M^-1 K = omega^2 and M^-1 D = gamma by Lanczos' method (from below; 1 % on networks of some thousand points),

@@ -1,10 +1,8 @@
 #pragma once
 
-#include <Eigen/IterativeLinearSolvers>
-#include <Eigen/SparseCholesky>
-#include <array>
 #include <vector>
 
+#include "flow/integrate/block_newton.h"
 #include "flow/springs/spring_system.h"
 
 namespace effuse::flow::springs {
@@ -15,19 +13,12 @@ struct HalfSpring {
   Real rest;
 };
 
-/// The implicit step's Hessian, lower half, and where each block lies in it. Made at the first implicit step.
+/// What the implicit step keeps between steps. Made at the first.
 struct ImplicitSolve {
-  using Matrix = Eigen::SparseMatrix<double>;
-  Matrix hessian;
-  Eigen::SimplicialLLT<Matrix> factor;  // of small networks; lattices fill in too much beyond
-  Eigen::ConjugateGradient<Matrix, Eigen::Lower, Eigen::IncompleteCholesky<double, Eigen::Lower, Eigen::NaturalOrdering<int>>> iterate;
-  bool direct = true;
-  std::vector<std::array<int, 3>> point_slot;   // first stored value of each column of a diagonal block
-  std::vector<std::array<int, 3>> spring_slot;  // of the block of a spring's two points
-  Eigen::VectorXd gradient, move;
-  std::vector<Vec3> start, target, trial;
+  BlockNewton newton;
+  std::vector<Vec3> start, target;
   std::vector<Vec3> direction;  // of the springs, at the step's start
-  ImplicitReport report;
+  BlockNewton::Report report;
 };
 
 struct SpringSystem::Impl {
