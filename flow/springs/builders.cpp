@@ -9,15 +9,13 @@
 #include "geometry/base/check.h"
 #include "geometry/base/error.h"
 #include "geometry/base/parallel.h"
-#include "geometry/mesh/measure.h"
 #include "geometry/mesh/validate.h"
-#include "geometry/query/mesh_surface.h"
+#include "geometry/query/cube_lattice.h"
 
 namespace effuse::flow::springs {
 
 namespace {
 
-constexpr int kSamples = 4;           // a side, of a cube's share of the inside
 constexpr Real kLeastShare = 1. / 16;  // of a cube's mass, for a point that the inside hardly touches
 
 /// Places a surface vertex on one point, or eight.
@@ -139,101 +137,26 @@ SpringBody cloth(const geometry::TriMesh& mesh, Real area_density, const SpringM
 }
 
 SpringBody filled(const geometry::TriMesh& mesh, Real spacing, Real density, const SpringMaterial& material, std::size_t max_points) {
-  CHECK_GT(spacing, 0);
   CHECK_GT(density, 0);
-  const geometry::MeshReport report = geometry::validate(mesh);
-  if (!report.closed()) throw InputError(Place{"springs"}, "the mesh is not closed, so it has no inside to fill: " + geometry::to_string(report));
-  const geometry::MeshSurface solid(mesh);
-  const Box3 box = geometry::bounds(mesh);
-  // One lattice of cubes about the box; the odd half cube is shared out at both ends.
-  std::array<std::size_t, 3> cubes;
-  Vec3 low;
-  for (int a = 0; a < 3; ++a) {
-    const Real count = std::max(1.0, std::ceil(box.sizes()[a] / spacing));
-    if (!(count < 1e6)) throw InputError(Place{"springs"}, fmt::format("a spacing of {:g} m needs {:g} points along one side of the mesh", spacing, count));
-    cubes[static_cast<std::size_t>(a)] = static_cast<std::size_t>(count);
-    low[a] = box.center()[a] - count * spacing / 2;
-  }
-  const std::size_t all = cubes[0] * cubes[1] * cubes[2];
-  if (all > 8 * max_points) throw InputError(Place{"springs"}, fmt::format("a spacing of {:g} m fills the mesh's box with {} cubes, more than {}; take a wider one", spacing, all, 8 * max_points));
-  const auto cube_low = [&](std::size_t c) {
-    return Vec3(low + spacing * Vec3(static_cast<Real>(c / (cubes[1] * cubes[2])), static_cast<Real>(c / cubes[2] % cubes[1]), static_cast<Real>(c % cubes[2])));
-  };
-  std::vector<float> share(all, -1);  // of the cube inside; -1: not kept
-  parallel_for(all, [&](std::size_t c) {
-    const Vec3 centre = cube_low(c) + Vec3::Constant(spacing / 2);
-    const Real distance = solid.contact(centre).distance, corner = spacing * std::sqrt(3.0) / 2;
-    if (distance > corner) return;
-    if (distance < -corner) {
-      share[c] = 1;
-      return;
-    }
-    int inside = 0;
-    for (int s = 0; s < kSamples * kSamples * kSamples; ++s) {
-      const Vec3 at(s / (kSamples * kSamples) + 0.5, s / kSamples % kSamples + 0.5, s % kSamples + 0.5);
-      inside += solid.contact(cube_low(c) + spacing / kSamples * at, 2 * spacing).distance < 0;
-    }
-    share[c] = static_cast<float>(inside) / (kSamples * kSamples * kSamples);
-  }, 16);
-
-  // Cubes that the mesh runs through stay, whatever their share: its vertices hang in them.
-  std::vector<std::uint8_t> kept(all, 0);
-  const auto cube_of = [&](const Vec3& p) {
-    std::array<std::size_t, 3> at;
-    for (int a = 0; a < 3; ++a)
-      at[static_cast<std::size_t>(a)] = std::min(cubes[static_cast<std::size_t>(a)] - 1, static_cast<std::size_t>(std::max(0.0, (p[a] - low[a]) / spacing)));
-    return (at[0] * cubes[1] + at[1]) * cubes[2] + at[2];
-  };
-  for (std::size_t c = 0; c < all; ++c) kept[c] = share[c] > 0;
-  for (const Vec3& p : mesh.positions) kept[cube_of(p)] = 1;
-
+  geometry::CubeLattice lattice = geometry::fill_with_cubes(mesh, spacing, "springs", max_points);
   SpringBody body;
-  const std::array<std::size_t, 3> points = {cubes[0] + 1, cubes[1] + 1, cubes[2] + 1};
-  constexpr Index kNone = ~Index{0};
-  std::vector<Index> number(points[0] * points[1] * points[2], kNone);
-  const auto corner_of = [&](std::size_t c, std::size_t k) {
-    const std::size_t i = c / (cubes[1] * cubes[2]) + (k >> 2), j = c / cubes[2] % cubes[1] + ((k >> 1) & 1), l = c % cubes[2] + (k & 1);
-    return (i * points[1] + j) * points[2] + l;
-  };
-  const Real cube_mass = density * spacing * spacing * spacing;
-  for (std::size_t c = 0; c < all; ++c) {
-    if (!kept[c]) continue;
-    for (std::size_t k = 0; k < 8; ++k) {
-      Index& point = number[corner_of(c, k)];
-      if (point == kNone) {
-        point = static_cast<Index>(body.state.x.size());
-        body.state.x.push_back(cube_low(c) + spacing * Vec3(static_cast<Real>(k >> 2), static_cast<Real>((k >> 1) & 1), static_cast<Real>(k & 1)));
-        body.network.mass.push_back(0);
-      }
-      body.network.mass[point] += std::max<Real>(static_cast<Real>(share[c]), kLeastShare) * cube_mass / 8;
-    }
-  }
-  if (body.state.x.size() > max_points)
-    throw InputError(Place{"springs"}, fmt::format("a spacing of {:g} m fills the mesh with {} points, more than {}; take a wider one", spacing, body.state.x.size(), max_points));
+  body.state.x = std::move(lattice.corners);
   rest(body);
+  body.network.mass.assign(body.state.x.size(), 0);
   body.network.materials = {material};
   std::map<std::pair<Index, Index>, bool> joined;
-  for (std::size_t c = 0; c < all; ++c) {
-    if (!kept[c]) continue;
-    for (std::size_t a = 0; a < 8; ++a)
+  const Real cube_mass = density * spacing * spacing * spacing;
+  for (std::size_t c = 0; c < lattice.cubes.size(); ++c)
+    for (std::size_t a = 0; a < 8; ++a) {
+      body.network.mass[lattice.cubes[c][a]] += std::max(static_cast<Real>(lattice.share[c]), kLeastShare) * cube_mass / 8;
       for (std::size_t b = a + 1; b < 8; ++b) {
-        const std::pair<Index, Index> ends = std::minmax(number[corner_of(c, a)], number[corner_of(c, b)]);
+        const std::pair<Index, Index> ends = std::minmax(lattice.cubes[c][a], lattice.cubes[c][b]);
         if (joined.try_emplace(ends, true).second) join(body, ends.first, ends.second, 0);
       }
-  }
-  body.surface = mesh;
-  for (const Vec3& p : mesh.positions) {
-    const std::size_t c = cube_of(p);
-    const Vec3 f = (p - cube_low(c)) / spacing;
-    std::array<Index, 8> point;
-    std::array<float, 8> weight;
-    for (std::size_t k = 0; k < 8; ++k) {
-      point[k] = number[corner_of(c, k)];
-      weight[k] = static_cast<float>((k >> 2 ? f.x() : 1 - f.x()) * ((k >> 1) & 1 ? f.y() : 1 - f.y()) * (k & 1 ? f.z() : 1 - f.z()));
     }
-    body.point.push_back(point);
-    body.weight.push_back(weight);
-  }
+  body.surface = mesh;
+  for (const Index cube : lattice.cube_of) body.point.push_back(lattice.cubes[cube]);
+  body.weight = std::move(lattice.weight);
   return body;
 }
 

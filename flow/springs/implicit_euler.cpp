@@ -11,39 +11,21 @@ namespace effuse::flow::springs {
 
 namespace {
 
-/// A quadratic that pulls one point along one direction, or all: what walls, contacts, friction and drag become for a step.
-struct PointTerm {
-  Index point;
-  Mat3 hessian;   // of the damping part, constant through the step
-};
-
 /// The step's energy and its derivatives. Inactive walls and contacts count as soon as the trial goes through them.
 class StepEnergy {
  public:
-  StepEnergy(const SpringNetwork& n, const Surroundings& around, Real dt, ImplicitSolve& s, const SpringState& y) : n_(n), around_(around), dt_(dt), s_(s) {
-    // Dampers act along the directions at the start, friction and wall dampers on points in touch there.
+  StepEnergy(const SpringNetwork& n, const Surroundings& around, Real dt, ImplicitSolve& s, const SpringState& y) : n_(n), around_(around), dt_(dt), s_(s), contacts_(around.contacts, around.response, y.x, y.v, dt) {
+    // Dampers act along the directions at the start, those of walls on points in touch there.
     s_.direction.resize(n.springs.size());
     for (std::size_t k = 0; k < n.springs.size(); ++k) {
       const Vec3 l = y.x[n.springs[k].a] - y.x[n.springs[k].b];
       const Real length = l.norm();
       s_.direction[k] = length > 0 ? Vec3(l / length) : Vec3(Vec3::Zero());
     }
-    const Real c = around.contact_damping / dt;
+    const Real c = around.response.damping / dt;
     for (std::size_t i = 0; i < n.size(); ++i)
       for (const PenaltyWall& wall : around.walls)
         if (wall.normal.dot(y.x[i]) + wall.offset < 0) damped_.push_back({static_cast<Index>(i), c * wall.normal * wall.normal.transpose()});
-    for (const PointContact& contact : around.contacts) {
-      const Real depth = contact.normal.dot(y.x[contact.point] - contact.foot);
-      if (depth >= 0) continue;
-      const Vec3 v = y.v[contact.point] - contact.velocity;
-      const Real speed = (v - contact.normal.dot(v) * contact.normal).norm();
-      const Mat3 normal = contact.normal * contact.normal.transpose();
-      const Real push = std::max(0.0, -around.contact_stiffness * depth - around.contact_damping * contact.normal.dot(v));
-      const Real slide = speed > 0 ? std::min(c, around.friction * push / speed / dt) : (around.friction > 0 ? c : 0);
-      damped_.push_back({contact.point, c * normal + slide * (Mat3::Identity() - normal)});
-      moved_.push_back(dt * contact.velocity);
-    }
-    first_contact_ = damped_.size() - moved_.size();
   }
 
   Real value(const std::vector<Vec3>& x) const {
@@ -53,7 +35,7 @@ class StepEnergy {
       e += n_.mass[i] * around_.drag / dt_ * (x[i] - s_.start[i] - dt_ * around_.wind).squaredNorm() / 2;
       for (const PenaltyWall& wall : around_.walls) {
         const Real depth = std::min(0.0, wall.normal.dot(x[i]) + wall.offset);
-        e += around_.contact_stiffness * depth * depth / 2;
+        e += around_.response.stiffness * depth * depth / 2;
       }
       return e;
     });
@@ -64,15 +46,11 @@ class StepEnergy {
       const Real slid = s_.direction[k].dot(x[spring.a] - s_.start[spring.a] - x[spring.b] + s_.start[spring.b]);
       return material.stiffness * stretch * stretch / 2 + material.damping / dt_ * slid * slid / 2;
     });
-    for (const PointContact& contact : around_.contacts) {
-      const Real depth = std::min(0.0, contact.normal.dot(x[contact.point] - contact.foot - dt_ * contact.velocity));
-      sum += around_.contact_stiffness * depth * depth / 2;
+    for (const WallDamper& damper : damped_) {
+      const Vec3 d = x[damper.point] - s_.start[damper.point];
+      sum += d.dot(damper.strength * d) / 2;
     }
-    for (std::size_t k = 0; k < damped_.size(); ++k) {
-      const Vec3 d = slid(k, x);
-      sum += d.dot(damped_[k].hessian * d) / 2;
-    }
-    return sum;
+    return sum + contacts_.value(x);
   }
 
   void derivatives(const std::vector<Vec3>& x, BlockNewton::Sink& sink) const {
@@ -91,18 +69,14 @@ class StepEnergy {
       for (const PenaltyWall& wall : around_.walls) {
         const Real depth = wall.normal.dot(x[i]) + wall.offset;
         if (depth >= 0) continue;
-        g += around_.contact_stiffness * depth * wall.normal;
-        h += around_.contact_stiffness * wall.normal * wall.normal.transpose();
+        g += around_.response.stiffness * depth * wall.normal;
+        h += around_.response.stiffness * wall.normal * wall.normal.transpose();
       }
       add(i, g, h);
     }
-    for (const PointContact& contact : around_.contacts) {
-      const Real depth = contact.normal.dot(x[contact.point] - contact.foot - dt_ * contact.velocity);
-      if (depth < 0 && !n_.held[contact.point])
-        add(contact.point, around_.contact_stiffness * depth * contact.normal, around_.contact_stiffness * contact.normal * contact.normal.transpose());
-    }
-    for (std::size_t k = 0; k < damped_.size(); ++k)
-      if (!n_.held[damped_[k].point]) add(damped_[k].point, damped_[k].hessian * slid(k, x), damped_[k].hessian);
+    for (const WallDamper& damper : damped_)
+      if (!n_.held[damper.point]) add(damper.point, damper.strength * (x[damper.point] - s_.start[damper.point]), damper.strength);
+    contacts_.derivatives(x, n_.held, sink);
     for (std::size_t k = 0; k < n_.springs.size(); ++k) {
       const Spring& spring = n_.springs[k];
       const SpringMaterial& material = n_.materials[spring.material];
@@ -123,17 +97,16 @@ class StepEnergy {
   }
 
  private:
-  Vec3 slid(std::size_t k, const std::vector<Vec3>& x) const {
-    const Vec3 d = x[damped_[k].point] - s_.start[damped_[k].point];
-    return k < first_contact_ ? d : Vec3(d - moved_[k - first_contact_]);
-  }
+  struct WallDamper {
+    Index point;
+    Mat3 strength;  // over dt
+  };
   const SpringNetwork& n_;
   const Surroundings& around_;
   Real dt_;
   ImplicitSolve& s_;
-  std::vector<PointTerm> damped_;  // walls first
-  std::vector<Vec3> moved_;        // of the contacts among them
-  std::size_t first_contact_ = 0;
+  std::vector<WallDamper> damped_;
+  ContactEnergy contacts_;
 };
 
 }  // namespace

@@ -80,25 +80,14 @@ void SpringSystem::velocity_rates(Real, const SpringState& y, SpringState& k) co
     }
     for (const PenaltyWall& wall : surroundings.walls) {
       const Real s = wall.normal.dot(x) + wall.offset;
-      if (s < 0) force -= (surroundings.contact_stiffness * s + surroundings.contact_damping * wall.normal.dot(v)) * wall.normal;
+      if (s < 0) force -= (surroundings.response.stiffness * s + surroundings.response.damping * wall.normal.dot(v)) * wall.normal;
     }
     if (surroundings.field) force += surroundings.field->at(x);
     k.v[i] = force / n.mass[i] + surroundings.gravity - surroundings.drag * (v - surroundings.wind);
   }, kGrain);
 
-  for (const PointContact& c : surroundings.contacts) {
-    if (n.held[c.point]) continue;
-    const Real s = c.normal.dot(y.x[c.point] - c.foot);
-    if (s >= 0) continue;
-    const Vec3 v = y.v[c.point] - c.velocity;
-    const Real push = std::max(0.0, -surroundings.contact_stiffness * s - surroundings.contact_damping * c.normal.dot(v));
-    const Vec3 slip = v - c.normal.dot(v) * c.normal;
-    const Real speed = slip.norm();
-    Vec3 force = push * c.normal;
-    // Coulomb's friction, below its bound a damper as strong as the normal one.
-    if (speed > 0) force -= std::min(surroundings.contact_damping, surroundings.friction * push / speed) * slip;
-    k.v[c.point] += force / n.mass[c.point];
-  }
+  for (const PlaneContact& c : surroundings.contacts)
+    if (!n.held[c.point]) k.v[c.point] += contact_force(c, surroundings.response, y.x[c.point], y.v[c.point]) / n.mass[c.point];
 }
 
 void SpringSystem::position_rates(Real, const SpringState& y, SpringState& k) const { k.x = y.v; }
@@ -165,8 +154,8 @@ SpringSystem::Spectrum SpringSystem::spectrum(const SpringState& y) const {
   Real lightest = std::numeric_limits<Real>::infinity();
   for (std::size_t i = 0; i < n.size(); ++i)
     if (!n.held[i]) lightest = std::min(lightest, n.mass[i]);
-  found.omega = std::sqrt(of(&SpringMaterial::stiffness) + surroundings.contact_stiffness / lightest);
-  found.gamma = of(&SpringMaterial::damping) + surroundings.contact_damping / lightest + surroundings.drag;
+  found.omega = std::sqrt(of(&SpringMaterial::stiffness) + surroundings.response.stiffness / lightest);
+  found.gamma = of(&SpringMaterial::damping) + surroundings.response.damping / lightest + surroundings.drag;
   return found;
 }
 

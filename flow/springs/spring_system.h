@@ -6,6 +6,7 @@
 
 #include "flow/integrate/block_newton.h"
 #include "flow/integrate/integrate.h"
+#include "flow/integrate/plane_contacts.h"
 #include "flow/springs/spring_network.h"
 #include "geometry/motion/force_grid.h"
 
@@ -19,13 +20,6 @@ struct PenaltyWall {
   Real offset = 0;              ///< [m]
 };
 
-/// The tangent plane of something a point is near, found before a step and used through it.
-struct PointContact {
-  Index point = 0;
-  Vec3 foot = Vec3::Zero(), normal = Vec3::UnitZ();  ///< normal: out of the solid
-  Vec3 velocity = Vec3::Zero();                      ///< of the solid there [m/s]
-};
-
 /// What acts on the points besides springs. Gravity and drag act on every one.
 struct Surroundings {
   Vec3 gravity = Vec3::Zero();  ///< [m/s^2]
@@ -33,9 +27,8 @@ struct Surroundings {
   Vec3 wind = Vec3::Zero();     ///< [m/s]
   const geometry::ForceGrid* field = nullptr;  ///< force on each point [N]; null: none
   std::vector<PenaltyWall> walls;
-  std::vector<PointContact> contacts;
-  Real contact_stiffness = 0, contact_damping = 0;  ///< of walls and contacts [N/m], [N s/m]
-  Real friction = 0;                                ///< of contacts (walls have none): Coulomb's coefficient
+  std::vector<PlaneContact> contacts;
+  PenaltyResponse response;  ///< of walls and contacts; walls have no friction
 };
 
 /// How the implicit step is solved.

@@ -13,8 +13,7 @@ JelloScene jello_scene(const JelloWorld& world) {
   scene.body.state = {world.positions, world.velocities};
 
   flow::springs::Surroundings& around = scene.surroundings;
-  around.contact_stiffness = world.collision;
-  around.contact_damping = world.collision_damping;
+  around.response = {world.collision, world.collision_damping, 0};
   if (world.field.resolution > 0) around.field = &world.field;
   for (int axis = 0; axis < 3; ++axis)
     for (const Real side : {1.0, -1.0}) around.walls.push_back({side * Vec3::Unit(axis), JelloWorld::kRoom});

@@ -133,8 +133,8 @@ TEST(SpringSystem, ImplicitEulerStandsAnyStiffnessAtFrameLongSteps) {
     Surroundings around;
     around.gravity = {0, 0, -9.81};
     around.walls = {{Vec3::UnitZ(), 0}};
-    around.contact_stiffness = stiffness;
-    around.contact_damping = 0.1;
+    around.response.stiffness = stiffness;
+    around.response.damping = 0.1;
     SpringSystem system(body.network);
     system.surroundings = around;
     SpringState y = body.state;
@@ -158,7 +158,7 @@ TEST(SpringSystem, LargeNetworksAreSolvedIterativelyToTheSameStep) {
   Surroundings around;
   around.gravity = {0, 0, -9.81};
   around.walls = {{Vec3::UnitZ(), 0}};
-  around.contact_stiffness = 1e4;
+  around.response.stiffness = 1e4;
   SpringSystem system(body.network);
   system.surroundings = around;
   system.implicit.tolerance = 1e-9;
@@ -200,8 +200,8 @@ TEST(SpringSystem, PointsRestOnAPenaltyWallWhereWeightAndSpringAgree) {
   SpringBody body{n, {{Vec3(0, 0, 0.1)}, {Vec3::Zero()}}, {}, {}, {}};
   Surroundings around;
   around.gravity = {0, 0, -10};
-  around.contact_stiffness = 1000;
-  around.contact_damping = 30;
+  around.response.stiffness = 1000;
+  around.response.damping = 30;
   around.walls = {{Vec3::UnitZ(), 0}};
   for (const Scheme scheme : {Scheme::kSymplecticEuler, Scheme::kRk4, Scheme::kImplicitEuler})
     EXPECT_NEAR(run(body, scheme, 1e-3, 5000, around).x[0].z(), -2 * 10 / 1000.0, 1e-6) << name(scheme);
@@ -221,14 +221,14 @@ TEST(SpringSystem, FrictionHoldsBelowItsAngleAndLetsGoAbove) {
   SpringBody body{n, {{-9.81 * std::cos(angle) / 1e4 * normal}, {Vec3::Zero()}}, {}, {}, {}};
   Surroundings around;
   around.gravity = {0, 0, -9.81};
-  around.contact_stiffness = 1e4;
-  around.contact_damping = 100;
+  around.response.stiffness = 1e4;
+  around.response.damping = 100;
   around.contacts = {{0, Vec3::Zero(), normal, Vec3::Zero()}};
   for (const Scheme scheme : {Scheme::kRk4, Scheme::kImplicitEuler}) {
-    around.friction = 0.9 * std::tan(angle);
+    around.response.friction = 0.9 * std::tan(angle);
     const Real slides = run(body, scheme, 1e-3, 1000, around).v[0].norm();
-    EXPECT_NEAR(slides, 9.81 * (std::sin(angle) - around.friction * std::cos(angle)), 0.15) << name(scheme);  // after 1 s; below the damper's bound it creeps
-    around.friction = 1.1 * std::tan(angle);
+    EXPECT_NEAR(slides, 9.81 * (std::sin(angle) - around.response.friction * std::cos(angle)), 0.15) << name(scheme);  // after 1 s; below the damper's bound it creeps
+    around.response.friction = 1.1 * std::tan(angle);
     // Held by a damper of 100 N s/m: it creeps at m g sin / 100.
     EXPECT_LT(run(body, scheme, 1e-3, 1000, around).v[0].norm(), 1.01 * 9.81 * std::sin(angle) / 100) << name(scheme);
   }
