@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "geometry/base/error.h"
@@ -101,8 +102,21 @@ Lines describe_scene(const fs::path& file) {
     if (node.kind == flow::Node::Kind::kTable ||
         (node.kind == flow::Node::Kind::kArray && !node.items.empty() && node.items.front().kind == flow::Node::Kind::kTable))
       tables += (tables.empty() ? "" : ", ") + key;
+  // Tables that stand for several things say so by copies.
+  std::string things;
+  for (const auto& [key, one, many] : {std::array{"obstacle", "obstacle", "obstacles"}, {"body", "body", "bodies"}, {"joint", "joint", "joints"}}) {
+    const flow::Node* list = scene.find(key);
+    if (!list || list->kind != flow::Node::Kind::kArray) continue;
+    std::int64_t count = 0;
+    for (const flow::Node& item : list->items) {
+      const flow::Node* copies = item.find("copies");
+      count += copies && copies->kind == flow::Node::Kind::kInteger && copies->integer > 0 ? std::min<std::int64_t>(copies->integer, 1000000) : 1;
+    }
+    if (count > 0) things += fmt::format("{}{} {}", things.empty() ? "" : ", ", count, count == 1 ? one : many);
+  }
   lines.push_back("scene: " + (name.empty() ? file.stem().string() : name));
   if (!effects.empty()) lines.push_back("effects: " + effects);
+  if (!things.empty()) lines.push_back("solid: " + things);
   lines.push_back("tables: " + (tables.empty() ? std::string("none") : tables));
   return lines;
 }

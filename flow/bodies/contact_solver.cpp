@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "flow/bodies/rigid_bodies.h"
 #include "geometry/base/check.h"
 
 namespace effuse::flow::bodies {
@@ -151,17 +152,33 @@ void ContactSolver::solve(bool push) {
 
 void ContactSolver::penalty() {
   const Real omega = 2 * kPi * options_.penalty_frequency, h = options_.h;
+  // All by the same speeds: a damper that saw what the spring beside it has just done would carry a share of the rest.
   for (Place& c : places_) {
-    c.push = c.drag1 = c.drag2 = 0;
-    c.twist.setZero();
-    if (c.separation >= 0) continue;
-    const Vec3 v = relative_velocity(c);
-    const Real force = -c.mass * (omega * omega * c.separation + 2 * options_.penalty_damping * omega * c.n.dot(v));
+    const Real force = c.separation < 0 ? -c.mass * (omega * omega * c.separation + 2 * options_.penalty_damping * omega * c.n.dot(relative_velocity(c))) : 0;
     c.push = h * std::max(Real{0}, force);
-    apply(c, c.push * c.n);
-    if (c.friction > 0) rub(c);
-    if (c.rolling > 0) roll(c);
     c.most = std::max(c.most, c.push);
+  }
+  // Friction begins with what it was, within the new cone.
+  for (Place& c : places_) {
+    const Real drag = std::hypot(c.drag1, c.drag2), twist = c.twist.norm();
+    const Real keep = drag > c.friction * c.push ? c.friction * c.push / drag : 1;
+    c.drag1 *= keep;
+    c.drag2 *= keep;
+    if (twist > c.rolling * c.push) c.twist *= c.rolling * c.push / twist;
+    if (c.push == 0) continue;
+    apply(c, c.push * c.n + c.drag1 * c.t1 + c.drag2 * c.t2);
+    if (c.rolling > 0) {
+      bodies_[c.a].twist(-c.twist);
+      bodies_[c.b].twist(c.twist);
+    }
+  }
+}
+
+void ContactSolver::rub_all() {
+  for (Place& c : places_) {
+    if (c.push == 0) continue;
+    if (c.rolling > 0) roll(c);
+    if (c.friction > 0) rub(c);
   }
 }
 
@@ -172,6 +189,19 @@ void ContactSolver::rebound() {
     const Real total = std::max(Real{0}, c.push - c.mass * (vn + c.restitution * c.approach));
     apply(c, (total - c.push) * c.n);
     c.push = total;
+  }
+}
+
+void ContactSolver::book(std::span<const std::uint8_t> wanted, int substep, std::vector<ContactLoad>& out) const {
+  for (const Place& c : places_) {
+    if (c.push == 0 && c.drag1 == 0 && c.drag2 == 0) continue;
+    const Vec3 P = c.push * c.n + c.drag1 * c.t1 + c.drag2 * c.t2;
+    for (const bool first : {true, false}) {
+      const Index i = first ? c.a : c.b;
+      if (i >= wanted.size() || !wanted[i]) continue;
+      const Mat3 to_body = bodies_[i].q.conjugate().toRotationMatrix();
+      out.push_back({i, substep, to_body * (first ? c.ra : c.rb), to_body * (first ? Vec3(-P) : P)});
+    }
   }
 }
 

@@ -8,6 +8,8 @@
 
 namespace effuse::flow::bodies {
 
+struct ContactLoad;
+
 /// What two surfaces are to each other.
 struct PairSurface {
   Real friction = 0, restitution = 0, rolling = 0;
@@ -19,7 +21,8 @@ struct PairSurface {
 ///   warm_start  the impulses of the last substep once more
 ///   solve       one round over all places, in order: friction within the cone, then the normal. `push`: take overlap away, too, by a
 ///               soft constraint of frequency 1 / (4 h) and ten times critical damping
-///   penalty     instead of all these: spring and damper
+///   penalty     instead of these: spring and damper, by the speeds of the last substep's end
+///   rub_all     with penalty: one round of friction, after all other forces, so that what rests does not creep
 ///   rebound     at the look's end
 class ContactSolver {
  public:
@@ -36,7 +39,10 @@ class ContactSolver {
   void warm_start();
   void solve(bool push);
   void penalty();
+  void rub_all();
   void rebound();
+  /// What each place has given in this substep to bodies whose flag is set.
+  void book(std::span<const std::uint8_t> wanted, int substep, std::vector<ContactLoad>& out) const;
   /// Impulses back into the points; the deepest overlap where the bodies were at the last prepare().
   Real finish();
 

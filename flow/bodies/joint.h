@@ -10,7 +10,7 @@ namespace effuse::flow::bodies {
 using BodyId = Index;
 using JointId = Index;
 
-/// What holds two bodies together, as it stands when it is made: anchor and axis are given in the world.
+/// What holds two bodies together, or one to the world, as it stands when it is made: anchor and axis are given in the world.
 ///   kBall      one point in common
 ///   kHinge     that, and one axis: turns about it
 ///   kSlider    one axis, no turning: moves along it
@@ -19,6 +19,7 @@ using JointId = Index;
 struct Joint {
   enum class Kind { kBall, kHinge, kSlider, kFixed, kDistance };
   static constexpr Real kFree = std::numeric_limits<Real>::infinity();
+  static constexpr BodyId kWorld = ~BodyId{0};  ///< in place of one of the bodies: what nothing moves
 
   Kind kind = Kind::kBall;
   BodyId a = 0, b = 0;             ///< the second moves relative to the first
@@ -31,10 +32,11 @@ struct Joint {
   Real low = -kFree, high = kFree;
   /// Motor of hinge [rad/s, N m] and slider [m/s, N]: drives b along the axis at `speed` with at most `strength`.
   Real motor_speed = 0, motor_strength = 0;
-  /// Of a distance joint: a spring instead of a rod (limits may stand beside it), solved implicitly, so that any
-  /// stiffness does [N/m, N s/m]. 0: a rod.
+  /// A spring and a damper along the freedom of a hinge [N m/rad, N m s/rad] or slider [N/m, N s/m] with rest where it stands,
+  /// instead of a motor; of a distance joint [N/m, N s/m] instead of a rod (limits may stand beside it). Solved implicitly, so
+  /// that any stiffness does. Both 0: none. A distance joint has no damping without stiffness.
   Real stiffness = 0, damping = 0;
-  /// Whether the two may touch each other.
+  /// Whether the two may touch each other. The ground is touched in any case.
   bool collide = false;
 };
 

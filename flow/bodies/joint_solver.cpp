@@ -61,7 +61,8 @@ Real position(const JointState& j, const Sides& s) {
 
 JointState make_joint_state(const Joint& joint, const SolverBody& a, const SolverBody& b) {
   const auto refuse = [&](const std::string& why) {
-    throw InputError(Place{}, fmt::format("{} joint of bodies {} and {}: {}", kJointNames[static_cast<int>(joint.kind)], joint.a, joint.b, why));
+    const auto name = [](BodyId id) { return id == Joint::kWorld ? std::string("world") : fmt::format("{}", id); };
+    throw InputError(Place{}, fmt::format("{} joint of bodies {} and {}: {}", kJointNames[static_cast<int>(joint.kind)], name(joint.a), name(joint.b), why));
   };
   if (joint.a == joint.b) refuse("joins a body to itself");
   if (!a.moved_by_impulses() && !b.moved_by_impulses()) refuse("neither can move");
@@ -76,7 +77,10 @@ JointState make_joint_state(const Joint& joint, const SolverBody& a, const Solve
   if (!std::isfinite(joint.motor_speed) || !(joint.motor_strength >= 0)) refuse("a motor needs a finite speed and a strength >= 0");
   if (joint.motor_strength > 0 && joint.kind != Kind::kHinge && joint.kind != Kind::kSlider) refuse("only hinges and sliders have motors");
   if (!(joint.stiffness >= 0) || !(joint.damping >= 0) || !std::isfinite(joint.stiffness) || !std::isfinite(joint.damping)) refuse("stiffness and damping must be >= 0");
-  if (joint.stiffness > 0 && joint.kind != Kind::kDistance) refuse("only distance joints are springs");
+  const bool spring = joint.stiffness > 0 || joint.damping > 0;
+  if (spring && (joint.kind == Kind::kBall || joint.kind == Kind::kFixed)) refuse("only hinges, sliders and distance joints have springs");
+  if (spring && joint.motor_strength > 0) refuse("has a motor or a spring, not both");
+  if (joint.damping > 0 && joint.stiffness == 0 && joint.kind == Kind::kDistance) refuse("a rod has no damping: a stiffness makes it a spring");
 
   JointState s;
   s.joint = joint;
@@ -118,7 +122,7 @@ JointSolver::JointSolver(Real h, std::span<const JointId> which, std::span<Joint
     const Joint& j = joints[id].joint;
     const int count = rows_of(j);
     if (count == 0) continue;
-    blocks_.push_back({id, j.a, j.b, rows, count});
+    blocks_.push_back({id, index(j.a), index(j.b), rows, count});
     rows += count;
   }
   rows_.resize(rows);
@@ -193,7 +197,8 @@ void JointSolver::make_rows(const JointState& j, const SolverBody& A, const Solv
 
 void JointSolver::make_extras(Index joint, int k) {
   const JointState& j = joints_[joint];
-  const SolverBody &A = bodies_[j.joint.a], &B = bodies_[j.joint.b];
+  const Index a = index(j.joint.a), b = index(j.joint.b);
+  const SolverBody &A = bodies_[a], &B = bodies_[b];
   const Sides s = sides(j, A, B, k);
   const Real at = position(j, s);
   Row row{Vec3::Zero(), Vec3::Zero(), Vec3::Zero(), 0};  // of the position's rate
@@ -219,7 +224,7 @@ void JointSolver::make_extras(Index joint, int k) {
   const Real K = (A.im + B.im) * row.l.squaredNorm() + row.on_a.dot(A.iI * row.on_a) + row.on_b.dot(B.iI * row.on_b);
   if (!(K > 0)) return;
   const auto add = [&](int slot) -> Extra& {
-    Extra e{joint, slot, j.joint.a, j.joint.b, row, 0, kInfinity};
+    Extra e{joint, slot, a, b, row, 0, kInfinity};
     e.mass = 1 / K;
     extras_.push_back(e);
     return extras_.back();
@@ -230,7 +235,7 @@ void JointSolver::make_extras(Index joint, int k) {
     e.high = -e.low;
     e.target = j.joint.motor_speed;
   }
-  if (j.joint.stiffness > 0) {
+  if (j.joint.stiffness > 0 || j.joint.damping > 0) {
     // Implicit: impulse = -h (k (C + h rate) + d rate).
     Extra& e = add(0);
     const Real kd = j.joint.damping + h_ * j.joint.stiffness;

@@ -37,6 +37,7 @@ Real joint_error(const JointState& joint, const SolverBody& a, const SolverBody&
 /// Source: Baraff 1996, SIGGRAPH, Linear-time dynamics using Lagrange multipliers.
 class JointSolver {
  public:
+  /// bodies: by body number, what nothing moves last.
   JointSolver(Real h, std::span<const JointId> which, std::span<JointState> joints, std::span<SolverBody> bodies);
 
   void prepare(int k);
@@ -84,6 +85,8 @@ class JointSolver {
   void make_rows(const JointState& j, const SolverBody& A, const SolverBody& B, int k, Row* rows) const;
   void make_extras(Index joint, int k);
   void fill();
+  /// Among bodies_: the world is the last.
+  Index index(BodyId id) const { return id == Joint::kWorld ? static_cast<Index>(bodies_.size() - 1) : id; }
 
   Real h_;
   std::vector<JointId> which_;

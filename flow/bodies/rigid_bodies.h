@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -19,7 +20,7 @@ namespace effuse::flow::bodies {
 /// How bodies are kept out of each other.
 ///   kConstraint  impulses that solve for the velocities: stiff, any step
 ///   kPenalty     a spring and a damper at each place of contact, as the jello lecture has it: soft, and the substep
-///                must resolve the spring
+///                must resolve the spring (penalty_step_limit): more are made where there are too few
 enum class ContactModel { kConstraint, kPenalty };
 inline constexpr std::string_view kContactModelNames[] = {"constraint", "penalty"};
 
@@ -30,8 +31,9 @@ struct BodyOptions {
   int iterations = 1;          ///< over the contacts, in a substep; where masses differ by 10^n, n more (at most 4)
   RotorScheme rotor = RotorScheme::kSplitting;
   ContactModel contact = ContactModel::kConstraint;
-  Real penalty_frequency = 60; ///< [1/s] of the penalty spring, with the reduced mass at the place
-  Real penalty_damping = 0.5;  ///< of critical
+  Real penalty_frequency = 60; ///< f [1/s] of the penalty spring: k = m (2 pi f)^2 with the reduced mass at the place
+  Real penalty_damping = 0.5;  ///< zeta, of critical: d = 2 zeta m 2 pi f
+  Real penalty_springs = 4;    ///< so many of them may push a body the same way, as far as the substep goes
   Real restitution_speed = 0.5;  ///< [m/s]: slower impacts do not rebound
   Real push_speed = 3;         ///< [m/s]: overlap is taken away no faster
   Real margin = 0.02;          ///< contacts are made this far ahead, in bounding radii (and as far as the speed asks)
@@ -40,6 +42,15 @@ struct BodyOptions {
   Real sleep_delay = 0.5;      ///< [s]
   int max_looks = 32;          ///< at most so many looks for contacts a step of fast bodies (see RigidBodies)
 };
+
+/// The longest stable substep h [s] of a body on n penalty springs that push the same way:
+///   (omega h)^2 + 4 zeta omega h = 4 / n,   omega = 2 pi f.
+/// Symplectic Euler with the damper taken explicitly,
+///   v' = v - h n (omega^2 x + 2 zeta omega v),   x' = x + h v',
+/// has the characteristic polynomial  l^2 - (2 - n (2 zeta omega h + omega^2 h^2)) l + (1 - 2 n zeta omega h),  whose roots stay
+/// inside the unit circle below that. One box on the ground counts 1.5 (it rocks), a stack of them 3. At rest a spring
+/// holds mass m at the depth m g / k = g / omega^2.
+Real penalty_step_limit(const BodyOptions& options, Real springs);
 
 /// Of a body's surface. Two in contact: the geometric mean of friction, the larger restitution and rolling.
 struct Surface {
@@ -58,6 +69,14 @@ struct BodyReport {
   Real penetration = 0;       ///< deepest overlap at a place of contact [m]
   Real joint_error = 0;       ///< largest distance [m] (or angle [rad]) any joint is off by
   Real kinetic = 0, potential = 0;  ///< [J] of dynamic bodies; potential against gravity, 0 at the origin
+};
+
+/// What a contact gave to a body whose loads are recorded (RigidBodies::record_loads), in one substep. In body axes, about its centre of mass.
+struct ContactLoad {
+  BodyId body = 0;
+  int substep = 0;             ///< counted through the whole step
+  Vec3 at = Vec3::Zero();      ///< [m]
+  Vec3 impulse = Vec3::Zero(); ///< [N s]
 };
 
 /// State, as Baraff's lectures have it: position x of the centre of mass, orientation q, linear momentum p, angular
@@ -118,6 +137,23 @@ class RigidBodies {
   Vec3 velocity_at(BodyId id, const Vec3& at) const;
   /// K: velocity_at(id, at) changes by K * impulse for an impulse at the same point [1/kg]. Zero for static and driven ones.
   Mat3 inverse_mass_at(BodyId id, const Vec3& at) const;
+
+  /// Takes a body out for good: nothing meets it, it has no momentum, its number is never given again. Wakes what it touches.
+  void retire(BodyId id);
+  bool is_gone(BodyId id) const;
+  /// Joints of `from` hold the body to(anchor in the world) instead, where they held it: before it is retired.
+  void hand_joints(BodyId from, const std::function<BodyId(const Vec3&)>& to);
+  /// Whether the loads of contacts on this body are kept; by island, place and substep.
+  void record_loads(BodyId id, bool on);
+  std::span<const ContactLoad> contact_loads() const;  ///< of the last step
+  /// What was added since the last step [N], [N m].
+  Vec3 force(BodyId id) const;
+  Vec3 torque(BodyId id) const;
+  const Surface& surface(BodyId id) const;
+  /// All that a step changes, to go back to while no body has come or gone.
+  struct Moment;
+  std::shared_ptr<const Moment> moment() const;
+  void go_back(const Moment& moment);
 
   /// dt [s] > 0. A step whose result is not finite is undone and tried with twice as many looks, six times; then
   /// UnstableError, everything as it was before the step.

@@ -83,11 +83,18 @@ BodyReport RigidBodies::step(Real dt) {
   throw UnstableError(fmt::format("rigid bodies: a step of {:.3g} s ends in numbers that are not finite, {} looks for contacts in it or fewer", dt, looks << kRetries));
 }
 
+/// Of a look this long [s].
+int RigidBodies::Impl::substeps_of(Real look) const {
+  if (options.contact != ContactModel::kPenalty) return options.substeps;
+  return std::max(options.substeps, static_cast<int>(std::ceil(look / penalty_step_limit(options, options.penalty_springs) * (1 - 1e-9))));
+}
+
 BodyReport RigidBodies::Impl::run(Real dt, int looks) {
   BodyReport report;
   report.dt = dt;
   report.looks = looks;
-  report.substeps = looks * options.substeps;
+  report.substeps = looks * substeps_of(dt / looks);
+  loads.clear();
   for (int k = 0; k < looks; ++k) look(dt / looks, k, looks, report);
   time += dt;
   for (Index i = 0; i < size(); ++i) {
@@ -109,11 +116,12 @@ BodyReport RigidBodies::Impl::run(Real dt, int looks) {
 
 void RigidBodies::Impl::look(Real dt, int number, int looks, BodyReport& report) {
   if (!finite()) throw NotFinite{};
+  const int substeps = substeps_of(dt);
   // Driven bodies: where they are now, and after each substep.
   for (Index i = 0; i < size(); ++i) {
     if (!driven_now[i]) continue;
-    path[i].resize(options.substeps + 1);
-    for (int k = 0; k <= options.substeps; ++k) path[i][k] = motion[i].pose((number + static_cast<Real>(k) / options.substeps) / looks);
+    path[i].resize(substeps + 1);
+    for (int k = 0; k <= substeps; ++k) path[i][k] = motion[i].pose((number + static_cast<Real>(k) / substeps) / looks);
     x[i] = path[i][0].position;
     q[i] = path[i][0].orientation;
     placed_well[i] = 0;
@@ -136,7 +144,7 @@ void RigidBodies::Impl::look(Real dt, int number, int looks, BodyReport& report)
   report.contacts = points.size();
 
   const std::vector<Vec3> before = x;
-  solve(dt, islands, report);
+  solve(dt, number, islands, report);
   if (!finite()) throw NotFinite{};
   stop_fast(before, static_cast<Real>(number) / looks, static_cast<Real>(number + 1) / looks, report);
   let_sleep(islands, dt);
@@ -148,7 +156,7 @@ void RigidBodies::Impl::place_bodies(Real dt) {
       size(),
       [&](std::size_t i) {
         const Index k = static_cast<Index>(i);
-        if (placed_well[i] && !awake(k)) return;
+        if (role[i] == Role::kGone || (placed_well[i] && !awake(k))) return;
         placed[i].place(*shape[i], x[i], q[i].toRotationMatrix());
         const Real bound = shape[i]->bounding_radius();
         Real reach = options.margin * bound;
@@ -166,6 +174,13 @@ void RigidBodies::Impl::place_bodies(Real dt) {
   active.resize(size());
   for (Index i = 0; i < size(); ++i) {
     active[i] = awake(i) || driven_now[i];
+    if (role[i] == Role::kGone) {
+      if (i >= broad->size()) {  // numbers have no gaps
+        broad->update(i, Box3(x[i], x[i]));
+        broad->remove(i);
+      }
+      continue;
+    }
     if (placed_well[i] && !awake(i)) continue;
     Box3 box = shape[i]->bounds(x[i], placed[i].R);
     const Vec3 grown = Vec3::Constant(placed[i].margin);
@@ -246,7 +261,7 @@ PairSurface RigidBodies::Impl::pair_surface(const ContactPoint& c) const {
   return {std::sqrt(a.friction * b.friction), std::max(a.restitution, b.restitution), std::max(a.rolling, b.rolling)};
 }
 
-void RigidBodies::Impl::solve(Real dt, std::vector<Island>& islands, BodyReport& report) {
+void RigidBodies::Impl::solve(Real dt, int number, std::vector<Island>& islands, BodyReport& report) {
   ZONE("bodies.solve");
   solver.resize(size() + 1);
   for (Index i = 0; i < size(); ++i) {
@@ -260,9 +275,12 @@ void RigidBodies::Impl::solve(Real dt, std::vector<Island>& islands, BodyReport&
   }
   solver[size()] = SolverBody{};  // the terrain
 
-  const Real h = dt / options.substeps;
+  const int substeps = substeps_of(dt);
+  const Real h = dt / substeps;
   std::vector<Real> deepest(islands.size(), 0);
-  parallel_for(islands.size(), [&](std::size_t k) { deepest[k] = solve_island(islands[k], h); }, 1);
+  std::vector<std::vector<ContactLoad>> given(islands.size());
+  parallel_for(islands.size(), [&](std::size_t k) { deepest[k] = solve_island(islands[k], h, substeps, number * substeps, given[k]); }, 1);
+  for (const auto& part : given) loads.insert(loads.end(), part.begin(), part.end());
   report.penetration = 0;
   for (const Real d : deepest) report.penetration = std::max(report.penetration, d);
   for (const Island& island : islands)
@@ -305,12 +323,12 @@ void RigidBodies::Impl::go_on(const Island& island, JointSolver& linkage, int k,
   for (const Index i : island.bodies) solver[i].refresh();
 }
 
-Real RigidBodies::Impl::solve_island(const Island& island, Real h) {
+Real RigidBodies::Impl::solve_island(const Island& island, Real h, int substeps, int first_substep, std::vector<ContactLoad>& loads_out) {
   const bool alone = island.points.empty() && island.joints.empty();
   if (alone) {
     // A ballistic arc is exact with the mean of the velocities.
     SolverBody& b = solver[island.bodies[0]];
-    for (int k = 1; k <= options.substeps; ++k) {
+    for (int k = 1; k <= substeps; ++k) {
       const Vec3 before = b.v;
       b.p += h * b.force;
       b.L += h * b.torque;
@@ -331,12 +349,13 @@ Real RigidBodies::Impl::solve_island(const Island& island, Real h) {
   JointSolver linkage(h, island.joints, joints, solver);
   const int iterations = options.iterations + more_iterations(local);
   const bool soft = options.contact == ContactModel::kPenalty;
+  const bool records = std::any_of(island.bodies.begin(), island.bodies.end(), [&](Index i) { return recorded[i] != 0; });
   contacts.prepare(0);
   linkage.prepare(0);
   // Half of the force before and half after a substep is of second order. What gives (contacts, limits, springs) wants all of it
   // before: it is answered twice in a substep, and must see the same force both times.
   const Real early = local.empty() && !linkage.gives() ? h / 2 : h, late = h - early;
-  for (int k = 1; k <= options.substeps; ++k) {
+  for (int k = 1; k <= substeps; ++k) {
     if (soft) contacts.penalty();  // by the speeds a substep ended with: a body at rest hangs where its spring carries it
     for (const Index i : island.bodies) {
       SolverBody& b = solver[i];
@@ -349,7 +368,8 @@ Real RigidBodies::Impl::solve_island(const Island& island, Real h) {
     if (!soft) contacts.warm_start();
     for (int r = 0; r < iterations; ++r) {
       linkage.solve_extras(true);
-      if (!soft) contacts.solve(true);
+      if (soft) contacts.rub_all();
+      else contacts.solve(true);
       linkage.solve_holding(true);
     }
     go_on(island, linkage, k, h);
@@ -362,8 +382,9 @@ Real RigidBodies::Impl::solve_island(const Island& island, Real h) {
       if (!soft) contacts.solve(false);
       linkage.solve_holding(false);
     }
+    if (!soft && k == substeps) contacts.rebound();
+    if (records) contacts.book(recorded, first_substep + k - 1, loads_out);
   }
-  if (!soft) contacts.rebound();
   const Real deepest = contacts.finish();
   for (std::size_t k = 0; k < local.size(); ++k) points[island.points[k]] = local[k];
   return deepest;
@@ -409,8 +430,12 @@ void RigidBodies::Impl::let_sleep(const std::vector<Island>& islands, Real dt) {
       const ContactPoint& c = points[k];
       if (driven_now[c.a] || (c.b != kTerrain && driven_now[c.b])) slow = false;
     }
-    for (const JointId j : island.joints)
-      if (driven_now[joints[j].joint.a] || driven_now[joints[j].joint.b]) slow = false;
+    for (const JointId j : island.joints) {
+      const Joint& joint = joints[j].joint;
+      for (const BodyId end : {joint.a, joint.b})
+        if (end != Joint::kWorld && driven_now[end]) slow = false;
+      if (joint.motor_strength > 0 && joint.motor_speed != 0) slow = false;  // however slowly it turns
+    }
     Real least = kInfinity;
     for (const Index i : island.bodies) {
       rested[i] = slow ? rested[i] + dt : 0;

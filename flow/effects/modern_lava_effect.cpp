@@ -9,6 +9,7 @@
 #include "flow/effects/solid_world.h"
 #include "flow/sph/lava_presets.h"
 #include "flow/sph/modern_lava.h"
+#include "geometry/base/error.h"
 #include "geometry/base/parallel.h"
 
 namespace effuse::flow {
@@ -23,6 +24,7 @@ using sph::ModernReport;
 using sph::Vent;
 
 constexpr Parameters::Range kTemperature = {0, 5000, true};
+constexpr Real kRush = 100;  // [m/s] of what may come to a vent within a step
 constexpr Parameters::Range kTolerance = {0, 0.1, true};
 
 template <std::size_t N>
@@ -32,16 +34,17 @@ std::vector<std::string> names(const std::string_view (&list)[N]) {
 
 class ModernLavaEffect final : public Effect {
  public:
-  ModernLavaEffect(const ModernOptions& options, const std::vector<Vent>& vents, const geometry::Terrain& terrain, const std::vector<PlacedObstacle>& obstacles, const std::vector<PlacedBody>& bodies)
-      : solids_(std::make_unique<SolidWorld>(obstacles, bodies, &terrain)),
+  ModernLavaEffect(const ModernOptions& options, const std::vector<Vent>& vents, const geometry::Terrain& terrain, std::unique_ptr<SolidWorld> solids)
+      : solids_(std::move(solids)),
         lava_(options, vents,
               {[terrain](std::span<const Vec3> x, Real reach, std::span<geometry::Contact> out) { terrain.contacts(x, reach, out); }},
               [terrain](const Vec3& p) { return terrain.height(p.x(), p.y()).has_value(); }, solids_->solids()),
-        heat_(options.heat.on) {
+        heat_(options.heat.on),
+        origin_(terrain.georeference().origin) {
     for (const Vent& vent : vents) {
       if (vent.rate <= 0) continue;
       const Real area = static_cast<Real>(vent.lattice(options.spacing).size()) * options.spacing * options.spacing;
-      openings_.push_back({vent.start, vent.stop, options.courant * options.spacing * area / vent.rate});
+      openings_.push_back({vent.start, vent.stop, options.courant * options.spacing * area / vent.rate, vent.lattice(options.spacing), (vent.from + vent.to) / 2});
     }
   }
 
@@ -50,7 +53,12 @@ class ModernLavaEffect final : public Effect {
 
   void step(Real t_end) override {
     const Real wanted = longest_step(t_end - lava_.time());
-    last_ = lava_.step(wanted);
+    try {
+      last_ = lava_.step(wanted);
+    } catch (const UnstableError& error) {
+      throw UnstableError(error.what() + blocked_vents(wanted));
+    }
+    solids_->wet(lava_.positions(), lava_.options().spacing);
     Totals& t = totals_;
     t.steps += 1;
     t.retries += last_.retries;
@@ -60,6 +68,8 @@ class ModernLavaEffect final : public Effect {
     // A step that ends a frame is as short as what was left of it.
     if (last_.dt < wanted || t.smallest_step > wanted) t.smallest_step = std::min(t.smallest_step, last_.dt);
     t.unsolved += last_.solved ? 0 : 1;
+    t.crushed += static_cast<Real>(last_.solids.crushed);
+    t.stopped += static_cast<Real>(last_.solids.stopped);
     t.divergence_error = std::max(t.divergence_error, last_.divergence_error);
     t.viscosity_residual = std::max(t.viscosity_residual, last_.viscosity_residual);
     t.largest_density_error = std::max(t.largest_density_error, last_.density_error);
@@ -68,6 +78,7 @@ class ModernLavaEffect final : public Effect {
 
   geometry::Points points() const override { return lava_.points(); }
   std::vector<geometry::RigidPose> body_poses() const override { return solids_->poses(); }
+  std::vector<SolidPiece> pieces() const override { return solids_->pieces(); }
   Real volume() const override { return lava_.volume(); }
   Real spacing() const override { return lava_.options().spacing; }
   std::size_t memory() const override { return lava_.memory(); }
@@ -126,6 +137,11 @@ class ModernLavaEffect final : public Effect {
                                        {"left_J", t.left}})
         figures.emplace_back(key, value);
     }
+    if (solids_->any()) {
+      figures.emplace_back("crushed", t.crushed);
+      figures.emplace_back("stopped", t.stopped);
+    }
+    for (auto& figure : solids_->figures()) figures.push_back(std::move(figure));
     return figures;
   }
 
@@ -139,6 +155,8 @@ class ModernLavaEffect final : public Effect {
   /// A vent's times, and the longest step while it is open [s].
   struct Opening {
     Real start, stop, step;
+    std::vector<Vec3> sites;
+    Vec3 middle;
   };
 
   /// The solver's step follows the lava that flows. A vent that opens onto ground where none does must be met in
@@ -150,12 +168,32 @@ class ModernLavaEffect final : public Effect {
     return wanted;
   }
 
+  /// For a step that failed: what is in or near a vent that is open, or will be within the step.
+  std::string blocked_vents(Real dt) const {
+    std::string text;
+    const Real now = lava_.time();
+    for (const Opening& o : openings_) {
+      if (now + dt < o.start || now >= o.stop) continue;
+      std::optional<SolidWorld::Near> worst;
+      for (const Vec3& site : o.sites) {
+        const auto near = solids_->nearest(site, 4 * spacing() + kRush * dt);
+        if (near && near->distance < 4 * spacing() + near->speed * dt && (!worst || near->distance < worst->distance)) worst = near;
+      }
+      if (!worst) continue;
+      const std::string where = worst->distance <= 0 ? "over" : fmt::format("{:.2g} m from", worst->distance);
+      text += fmt::format("; {}{} is {} the open vent at {:.10g}, {:.10g}: where lava comes out nothing may stand or pass, or be slower than the lava", worst->name,
+                          worst->speed > 0 ? fmt::format(", {:.3g} m/s fast,", worst->speed) : "", where, o.middle.x() + origin_.x(), o.middle.y() + origin_.y());
+    }
+    return text;
+  }
+
   /// Of all steps so far; numbers as the figures show them. Heat in J.
   struct Totals {
     Real steps = 0, retries = 0;
     Real pressure_iterations = 0, viscosity_iterations = 0, density_iterations = 0;
     Real smallest_step = 1e9, largest_density_error = 0;
     Real unsolved = 0, divergence_error = 0, viscosity_residual = 0;  // steps; worst of all
+    Real crushed = 0, stopped = 0;  // particles among obstacles, once a step each (geometry::Slid)
     Real radiated = 0, convected = 0, ground = 0, viscous = 0, vent = 0, left = 0;
     Real stored = 0;  // now
   };
@@ -187,6 +225,8 @@ class ModernLavaEffect final : public Effect {
     io.value("smallest_step", t.smallest_step);
     io.value("largest_density_error", t.largest_density_error);
     io.value("unsolved", t.unsolved);
+    io.value("crushed", t.crushed);
+    io.value("stopped", t.stopped);
     io.value("divergence_error", t.divergence_error);
     io.value("viscosity_residual", t.viscosity_residual);
     io.value("radiated", t.radiated);
@@ -204,6 +244,7 @@ class ModernLavaEffect final : public Effect {
   std::unique_ptr<SolidWorld> solids_;  // lava_ refers to it
   ModernLava lava_;
   bool heat_;
+  Vec3 origin_;  // of the map
   std::vector<Opening> openings_;
   ModernReport last_;
   Totals totals_;
@@ -359,8 +400,7 @@ LavaModel read_modern_lava(Parameters& p) {
   model.make = [o](const std::vector<Vent>& vents, const World& world) -> std::unique_ptr<Effect> {
     ModernOptions options = o;
     options.seed = world.seed;
-    return std::make_unique<ModernLavaEffect>(options, vents, *world.terrain, world.obstacles ? *world.obstacles : std::vector<PlacedObstacle>{},
-                                              world.bodies ? *world.bodies : std::vector<PlacedBody>{});
+    return std::make_unique<ModernLavaEffect>(options, vents, *world.terrain, make_solid_world(world));
   };
   return model;
 }

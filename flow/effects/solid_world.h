@@ -1,14 +1,23 @@
 #pragma once
 
 #include <memory>
+#include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
+#include "flow/bodies/brittle_bodies.h"
 #include "flow/bodies/rigid_bodies.h"
+#include "flow/scene/effect.h"
+#include "flow/scene/joints.h"
 #include "flow/scene/obstacles.h"
 #include "flow/scene/rigid_bodies.h"
 #include "flow/sph/solids.h"
 
 namespace effuse::flow {
+
+/// A scene's settings as the solver takes them.
+bodies::BodyOptions body_options(const BodySettings& settings);
 
 /// All that is solid beside the terrain, as one lava meets it: obstacles on their tracks and rigid bodies, which meet one another and
 /// the terrain, too. Lava and bodies move each other: both solves of a lava step hold the bodies' velocities as unknowns beside the
@@ -16,10 +25,15 @@ namespace effuse::flow {
 /// as long, with gravity and their contacts. Momentum is kept, to the tolerance of the viscosity's solve.
 ///
 /// What a body rests on is known to the lava by how it held the body up in the step before (Movable::acceleration).
-/// Surfaces are numbered from 1: obstacles, then bodies, in their order. Not to be moved while a lava refers to it.
+/// Surfaces are numbered from 1: obstacles, then bodies, in their order, then pieces of those that break as they come. Numbers of
+/// bodies that are gone are not given again. Not to be moved while a lava refers to it.
+///
+/// What lava does to a body that may break is spread over the places where particles lie on it (wet()) as one smooth field a + b x r whose
+/// force and moment are those of the solves, so that a wall bends under lava that stands against it.
 class SolidWorld {
  public:
-  SolidWorld(const std::vector<PlacedObstacle>& obstacles, const std::vector<PlacedBody>& bodies, const geometry::Terrain* terrain, const bodies::BodyOptions& options = {});
+  SolidWorld(const std::vector<PlacedObstacle>& obstacles, const std::vector<PlacedBody>& bodies, const geometry::Terrain* terrain, const bodies::BodyOptions& options = {},
+             const std::vector<PlacedJoint>& joints = {});
 
   /// For ModernLava; refers to this object. No obstacles of any kind: empty.
   sph::SolidOptions solids();
@@ -27,11 +41,28 @@ class SolidWorld {
   /// Obstacles' ways from one moment to another [s]; bodies', that of their last step.
   void move(Real from, Real to);
 
+  /// Without lava: obstacles and bodies go on from `time` by dt [s].
+  void step(Real time, Real dt);
+
+  /// The nearest thing within reach [m] of a point where all stand now (stand, move), and what its table calls it.
+  struct Near {
+    std::string name;
+    Real distance = 0, speed = 0;  ///< [m], negative inside; of the surface there [m/s]
+  };
+  std::optional<Near> nearest(const Vec3& point, Real reach) const;
+  bool any() const { return !obstacles_.empty(); }
   bool has_bodies() const { return bodies_ != nullptr; }
   const bodies::RigidBodies& bodies() const { return *bodies_; }
-  /// Poses of the bodies' frames, in their order.
+  /// Where particles lie on bodies that may break, for the next step. Without such bodies: nothing.
+  void wet(std::span<const Vec3> x, Real spacing);
+  /// Bodies that may break, as they are now, in pieces or whole.
+  std::vector<SolidPiece> pieces() const;
+  /// Poses of the bodies' frames, in their order; of one that broke, where it did.
   std::vector<geometry::RigidPose> poses() const;
   Vec3 velocity(std::size_t body) const;
+  /// What its steps came to, for a run's report; none without bodies.
+  std::vector<std::pair<std::string, double>> figures() const;
+  const bodies::BodyReport& last() const { return last_; }
 
   void add_to(StateHash& hash) const;
   void save(StateWriter& out) const;
@@ -41,16 +72,38 @@ class SolidWorld {
   void go(std::size_t obstacle, const geometry::RigidMotion& motion);
   void tell(std::vector<sph::Movable>& movable) const;
   void take(std::span<const sph::Movable> movable, Real dt);
+  void step_bodies(Real dt);
+  void spread(std::size_t body, const Vec3& force, const Vec3& torque);
+  void admit_pieces();
+  void admit(bodies::BodyId id, Index parent);
+  bool gone(std::size_t body) const { return bodies_->is_gone(ids_[body]); }
+  template <class Self, class Archive>
+  static void archive(Self& self, Archive& io);
 
+  std::vector<std::string> names_;       // obstacles', then bodies'
   std::vector<geometry::PoseTrack> tracks_;
   std::vector<bodies::BodyId> driven_;   // of each obstacle; only where there are bodies
-  std::vector<bodies::BodyId> ids_;      // of bodies
+  std::vector<bodies::BodyId> ids_;      // of bodies, then pieces
+  std::size_t of_scene_ = 0;             // bodies of the scene among them
+  std::vector<Index> origin_;            // body of the scene that each is or broke off
+  std::vector<Real> temperature_;
+  std::vector<std::shared_ptr<const geometry::TriMesh>> look_;  // of those that may break
+  std::vector<std::vector<Vec3>> wet_;   // places of lava on them, in their frames
   std::vector<Real> friction_;
   std::vector<Vec3> acceleration_;       // of bodies, by all but lava, in the last step [m/s^2]
   std::vector<geometry::RigidPose> before_;  // body axes at the last step's begin
   Real last_dt_ = 0, time_ = 0;
+  bodies::BodyReport last_;
+  struct Totals {
+    Real steps = 0, retries = 0, stopped = 0, penetration = 0, joint_error = 0;  // the last two: the largest of any step
+    Real broken = 0, redone = 0;  // bodies that came apart; steps made anew for it
+  } totals_;
   geometry::Obstacles obstacles_;
   std::unique_ptr<bodies::RigidBodies> bodies_;
+  std::unique_ptr<bodies::BrittleBodies> brittle_;  // null: none may break
 };
+
+/// Of the obstacles, bodies and joints of a world, with its settings.
+std::unique_ptr<SolidWorld> make_solid_world(const World& world);
 
 }  // namespace effuse::flow

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "flow/scene/joints.h"
 #include "flow/scene/obstacles.h"
 #include "flow/scene/parameters.h"
 #include "flow/scene/rigid_bodies.h"
@@ -23,6 +24,8 @@ struct World {
   std::uint64_t seed = 1;
   const std::vector<PlacedObstacle>* obstacles = nullptr;  ///< null: none
   const std::vector<PlacedBody>* bodies = nullptr;         ///< null: none
+  const std::vector<PlacedJoint>* joints = nullptr;        ///< null: none
+  BodySettings body_settings = {};
 };
 
 /// What an effect is expected to cost: for `effuse check`.
@@ -32,6 +35,18 @@ struct Estimate {
   double bytes = 0;      ///< of memory, at the end
   double steps = 0;      ///< in all, at the largest stable size
   double seconds = 0;    ///< of two cores; a rough figure
+};
+
+/// A solid thing that came into the world after its beginning.
+///   id    its number, never given again
+///   body  of the scene's bodies that it broke off, or kNoBody
+///   mesh  closed, its own frame, flat normals; "inner": 1 on faces that breaking has made, 0 on others
+struct SolidPiece {
+  static constexpr Index kNoBody = ~Index{0};
+  Index id = 0, body = kNoBody;
+  std::shared_ptr<const geometry::TriMesh> mesh;
+  geometry::RigidPose pose;
+  Real temperature = 0;  ///< of its surface [K]; 0: that of the air
 };
 
 /// Something that must be stepped, as the run loop sees it: one adapter an effect, over a solver that
@@ -52,6 +67,8 @@ class Effect {
   virtual Real spacing() const { return 0; }
   /// Where the world's bodies are, in their order, as this effect moves them; empty: it moves none.
   virtual std::vector<geometry::RigidPose> body_poses() const { return {}; }
+  /// What bodies that can break are made of now, a piece each (whole ones, too), and what else has come.
+  virtual std::vector<SolidPiece> pieces() const { return {}; }
   virtual std::size_t memory() const = 0;  ///< bytes held
   virtual void add_to(StateHash& hash) const = 0;
   virtual void save(StateWriter& out) const = 0;
@@ -78,6 +95,8 @@ struct EffectKind {
   std::string what;
   /// Reads the table; faults stay in parameters. duration: simulated time of the scene [s].
   EffectPlan (*read)(Parameters& parameters, Real duration);
+  /// It steps the scene's bodies and obstacles where no other effect meets them; its table is then there without being written.
+  bool of_solids = false;
 };
 
 }  // namespace effuse::flow

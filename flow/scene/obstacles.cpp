@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <filesystem>
 
 #include "flow/scene/placing.h"
 
@@ -16,13 +15,7 @@ std::vector<PlannedObstacle> read_obstacles(Parameters& root) {
   std::vector<PlannedObstacle> plans;
   for (Parameters& p : root.tables("obstacle", "a mesh that lava flows around: standing, or moving by keys")) {
     PlannedObstacle plan;
-    plan.place = p.place("");
-    plan.file = p.text("file", std::nullopt, "any mesh, relative to the scene file; closed parts are solids, open ones sheets with two sides");
-    plan.file_place = p.place("file");
-    if (p.has("file") && (plan.file.empty() || plan.file.find('\0') != std::string::npos)) p.fault("file", "is not the name of a file");
-    plan.name = p.text("name", std::filesystem::path(plan.file).stem().string(), "for people and files");
-    plan.scale = p.number("scale", "", plan.scale, Parameters::positive(), "of the mesh's numbers: 0.01 if they are centimetres");
-    plan.y_up = p.choice("up", {"z", "y"}, 0, "the mesh's axis that points up") == 1;
+    read_form(p, "any mesh, relative to the scene file; closed parts are solids, open ones sheets with two sides", plan);
     plan.on_ground = p.flag("on_ground", plan.on_ground, "heights count from the terrain at x, y");
     plan.temperature = p.number("temperature", "K", plan.temperature, {0, 5000}, "of its surface; 0: the ground's");
     plan.friction = p.number("friction", "", plan.friction, {0, 1}, "of lava on it: 1 no slip, 0 free slip");
@@ -59,7 +52,7 @@ void place_obstacle(const PlannedObstacle& plan, geometry::TriMesh mesh, const g
   mesh = upright(std::move(mesh), plan.scale, plan.y_up);
   if (too_large(mesh, fmt::format("obstacle '{}'", plan.name), plan.file_place, faults)) return;
   try {
-    placed.push_back({plan.name, geometry::CollisionMesh(mesh), geometry::PoseTrack(std::move(keys), plan.motion), plan.temperature, plan.friction});
+    placed.push_back({plan.name, geometry::CollisionMesh(mesh), geometry::PoseTrack(std::move(keys), plan.motion), plan.temperature, plan.friction, plan.color});
   } catch (const InputError& error) {
     for (const Fault& fault : error.faults()) faults.push_back({plan.file_place, fmt::format("obstacle '{}': {}", plan.name, fault.message)});
   }

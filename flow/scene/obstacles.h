@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "flow/scene/parameters.h"
+#include "flow/scene/placing.h"
 #include "geometry/collide/collision_mesh.h"
 #include "geometry/motion/pose_track.h"
 #include "geometry/terrain/terrain.h"
@@ -11,12 +12,7 @@
 namespace effuse::flow {
 
 /// A mesh that stands or moves in a scene, as its table [[obstacle]] describes it.
-struct PlannedObstacle {
-  std::string name;  ///< for people and files: the table's, or else the file's
-  std::string file;  ///< as written; relative to the scene file
-  Place file_place, place;
-  Real scale = 1;     ///< of the mesh's numbers
-  bool y_up = false;  ///< the mesh's own axis
+struct PlannedObstacle : PlannedForm {
   bool on_ground = true;  ///< heights count from the terrain under the place
   std::vector<geometry::PoseKey> keys;  ///< in the terrain file's coordinates
   geometry::KeyMotion motion = geometry::KeyMotion::kSmooth;
@@ -34,6 +30,7 @@ struct PlacedObstacle {
   geometry::PoseTrack track;
   Real temperature = 0;
   Real friction = 1;
+  Vec3 color = Vec3::Constant(-1);  ///< as PlannedForm has it
 };
 
 /// The mesh of a plan's file, put on its terrain. What does not fit (no ground under it, times that do not rise, a mesh that is

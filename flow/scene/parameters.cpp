@@ -281,6 +281,31 @@ std::string Parameters::text(const std::string& key, std::optional<std::string> 
   return value;
 }
 
+std::vector<std::string> Parameters::texts(const std::string& key, std::size_t count, std::string_view what) {
+  Table::Entry& entry = table_->entry(key);
+  const std::string wanted = fmt::format("an array of {} texts in quotes", count);
+  shared_->document(joined(table_->doc_path, key), wanted, "", what);
+  const Node* node = table_->node ? table_->node->find(key) : nullptr;
+  if (!node) {
+    fault(key, fmt::format("is missing ({}), wanted {}", what, wanted));
+    return {};
+  }
+  Node resolved;
+  resolved.kind = Node::Kind::kArray;
+  resolved.place = node->place;
+  std::vector<std::string> value;
+  for (const Node& item : node->items) {
+    if (item.kind == Node::Kind::kText) value.push_back(item.text);
+    resolved.items.push_back(text_node(item.text, item.place));
+  }
+  if (node->kind != Node::Kind::kArray || node->items.size() != count || value.size() != count) {
+    fault(key, fmt::format("found {}, wanted {}", node->kind != Node::Kind::kArray ? shown(*node) : value.size() < node->items.size() ? "an array of other things" : fmt::format("an array of {}", value.size()), wanted));
+    return {};
+  }
+  entry.value = std::move(resolved);
+  return value;
+}
+
 std::size_t Parameters::choice(const std::string& key, const std::vector<std::string>& names, std::size_t fallback, std::string_view what) {
   CHECK_LT(fallback, names.size());
   Table::Entry& entry = table_->entry(key);

@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
+
+#include "geometry/procedural/primitives.h"
+
 namespace effuse::flow {
 
 using geometry::RigidPose;
@@ -15,6 +19,37 @@ Quat turned(const std::vector<Real>& angles) {
 }
 
 }  // namespace
+
+void read_form(Parameters& p, std::string_view file_what, PlannedForm& form) {
+  form.place = p.place("");
+  form.file = p.text("file", "", file_what);
+  const std::vector<Real> edges = p.numbers("box", "m", 3, false, "instead of a file: edges of a box about its own origin");
+  form.ball = p.number("ball", "m", 0, Parameters::not_negative(), "instead of a file: radius of a ball about its own origin");
+  form.scale = p.number("scale", "", form.scale, Parameters::positive(), "of the mesh's numbers: 0.01 if they are centimetres");
+  form.y_up = p.choice("up", {"z", "y"}, 0, "the mesh's axis that points up") == 1;
+  const bool file = !form.file.empty(), box = edges.size() == 3, ball = form.ball > 0;
+  form.file_place = p.place(file ? "file" : p.has("box") ? "box" : "ball");
+  if (form.file.find('\0') != std::string::npos || (p.has("file") && !file && !box && !ball)) p.fault("file", "is not the name of a file");
+  else if (!file && !p.has("box") && !p.has("ball")) p.fault("file", fmt::format("is missing ({}), wanted the name of a file in quotes, or box or ball instead", file_what));
+  else if (p.has("ball") && !ball && !file && !p.has("box")) p.fault("ball", "needs a radius above 0");
+  if (file + box + ball > 1) p.fault(box ? "box" : "ball", fmt::format("found with {}, wanted one of file, box and ball", file ? "file" : "ball"));
+  if (box) {
+    form.box = Vec3(edges[0], edges[1], edges[2]);
+    if (!(form.box.minCoeff() > 0)) p.fault("box", fmt::format("edges {:g}, {:g}, {:g} m, must all be longer than 0", edges[0], edges[1], edges[2]));
+  }
+  if (!file && (form.scale != 1 || form.y_up) && (box || ball)) p.fault(form.scale != 1 ? "scale" : "up", "is of a file's mesh; a box and a ball are in metres");
+  form.name = p.text("name", box ? "box" : ball ? "ball" : std::filesystem::path(form.file).stem().string(), "for people, files and joints");
+  if (p.has("name") && (form.name.empty() || form.name == "world")) p.fault("name", fmt::format("'{}' is no name for a thing: {}", form.name, form.name.empty() ? "it is empty" : "it is that of what stands still"));
+  if (const std::vector<Real> rgb = p.numbers("color", "", 3, false, "red, green and blue, 0 to 1 (sRGB), in pictures and files"); rgb.size() == 3) {
+    form.color = Vec3(rgb[0], rgb[1], rgb[2]);
+    if (form.color.minCoeff() < 0 || form.color.maxCoeff() > 1) p.fault("color", "has a number that is not from 0 to 1");
+  }
+}
+
+geometry::TriMesh mesh_of(const PlannedForm& form) {
+  constexpr int kSubdivisions = 3;
+  return form.ball > 0 ? geometry::make_sphere(Vec3::Zero(), form.ball, kSubdivisions) : geometry::make_box(-form.box / 2, form.box / 2);
+}
 
 RigidPose read_pose(Parameters& p, bool required, const RigidPose& fallback) {
   RigidPose pose = fallback;

@@ -30,6 +30,8 @@ constexpr const char* kHeader =
     "frame,time_s,front_m,front_x,front_y,inundated_m2,covered_m2,volume_m3,discharge_m3_s,max_speed_m_s,mean_temperature_K,max_temperature_K,min_temperature_K";
 constexpr const char* kHeatBudget[] = {"radiated_J", "convected_J", "ground_J", "vent_J", "stored_J", "viscous_J", "left_J"};
 
+constexpr const char* kAmongObstacles[] = {"crushed", "stopped"};
+
 const flow::Effect* first_with_particles(const flow::Simulation& simulation) {
   for (const auto& effect : simulation.effects())
     if (effect->spacing() > 0) return effect.get();
@@ -73,6 +75,9 @@ FlowWriter::FlowWriter(const LoadedScene& loaded, fs::path folder) : loaded_(loa
   for (const char* term : kHeatBudget)
     for (const auto& [name, value] : effect_->figures())
       if (name == term) budget_.emplace_back(term);
+  for (const char* count : kAmongObstacles)
+    for (const auto& [name, value] : effect_->figures())
+      if (name == count) budget_.emplace_back(count);
   vents_ = vents_of(loaded.resolved, effect_->name(), loaded.terrain->georeference().origin.head<2>());
 }
 

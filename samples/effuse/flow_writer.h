@@ -34,6 +34,8 @@ namespace effuse {
 ///                               if it has all three temperatures, else of what its points show (their surfaces, maybe)
 ///   radiated_J convected_J ground_J vent_J stored_J viscous_J left_J   heat budget since the start; columns are there for the terms that
 ///                               the effect has among its figures (the classic lava has none)
+///   crushed, stopped            with obstacles: times, since the start, that a particle found no room among them, or was held because
+///                               it met too many in one step (geometry::Slid)
 ///
 /// Everything is sampled at frames: a run of more frames a second sees more. What has been gathered is kept beside
 /// each checkpoint (checkpoints/flow.0042.state), so that a run resumed writes the same bytes.

@@ -23,6 +23,7 @@ std::string numbered(const char* stem, int frame, const char* extension) { retur
 FrameWriter::FrameWriter(const flow::Scene& scene, const skin::SkinSettings& settings, const geometry::Terrain& terrain,
                          const SolidThings& solids, fs::path folder)
     : scene_(scene), settings_(settings), terrain_(terrain), solids_(solids), folder_(std::move(folder)) {
+  for (const flow::EffectPlan& plan : scene.effects) lava_ |= plan.name == "lava";
   if (settings.preview) preview_ = std::make_unique<skin::Preview>(terrain.mesh());
 }
 FrameWriter::~FrameWriter() = default;
@@ -73,14 +74,17 @@ FrameWriter::Result FrameWriter::write_frame(const flow::Simulation& simulation)
   COUNT("skin.triangles", mesh.triangles.size());
 
   const fs::path frames = folder_ / "frames";
-  if (settings_.ply) skin::write_skin_ply(frames / numbered("skin", frame, "ply"), mesh, skin.regions, about);
-  if (settings_.obj) skin::write_obj(frames / numbered("skin", frame, "obj"), mesh, about);
-  if (settings_.glb) skin::write_glb(frames / numbered("skin", frame, "glb"), mesh, about);
-  if (settings_.vdb) skin::write_vdb(frames / numbered("lava", frame, "vdb"), skin.surface, about);
+  if (lava_ && settings_.ply) skin::write_skin_ply(frames / numbered("skin", frame, "ply"), mesh, skin.regions, about);
+  if (lava_ && settings_.obj) skin::write_obj(frames / numbered("skin", frame, "obj"), mesh, about);
+  if (lava_ && settings_.glb) skin::write_glb(frames / numbered("skin", frame, "glb"), mesh, about);
+  if (lava_ && settings_.vdb) skin::write_vdb(frames / numbered("lava", frame, "vdb"), skin.surface, about);
   std::vector<geometry::RigidPose> poses;
   for (const auto& effect : simulation.effects())
     if (poses.empty()) poses = effect->body_poses();
-  const geometry::TriMesh solids = solids_.at(simulation.time(), poses);
+  std::vector<flow::SolidPiece> pieces;
+  for (const auto& effect : simulation.effects())
+    for (flow::SolidPiece& piece : effect->pieces()) pieces.push_back(std::move(piece));
+  const geometry::TriMesh solids = solids_.at(simulation.time(), poses, pieces);
   if (settings_.ply && solids_.any_moves()) skin::write_ply(frames / numbered("obstacles", frame, "ply"), solids, about);
   if (preview_) {
     const skin::Image image = preview_->render(in_one_picture(mesh, solids), skin::picture_at(settings_, terrain_, frame / scene_.fps));
@@ -100,7 +104,8 @@ void FrameWriter::write_contact_sheet(int frames) {
     const fs::path picture = folder_ / "preview" / numbered("preview", frame, "png");
     if (!fs::exists(picture)) continue;  // a resumed run may have made its first frames without
     pictures.push_back(picture);
-    labels.push_back(fmt::format("frame {}   {:.0f} s", frame, scene_.frame_time(frame)));
+    // Short films want tenths.
+    labels.push_back(fmt::format("frame {}   {:.{}f} s", frame, scene_.frame_time(frame), scene_.frame_time(frames) < 3 * count ? 1 : 0));
   }
   if (!pictures.empty()) skin::write_contact_sheet(folder_ / "preview" / "contact_sheet.png", pictures, labels, 3);
 }
@@ -127,10 +132,10 @@ void FrameWriter::write_manifest(int frames_done, const std::vector<std::pair<st
   if (solids_.any()) m["obstacles"] = {{"files", {"obstacles.ply", "obstacles.glb"}}};
   ordered_json files = ordered_json::object();
   if (settings_.ply && solids_.any_moves()) files["obstacles"] = "frames/obstacles.####.ply";
-  if (settings_.ply) files["ply"] = "frames/skin.####.ply";
-  if (settings_.obj) files["obj"] = "frames/skin.####.obj";
-  if (settings_.glb) files["glb"] = "frames/skin.####.glb";
-  if (settings_.vdb) files["vdb"] = "frames/lava.####.vdb";
+  if (lava_ && settings_.ply) files["ply"] = "frames/skin.####.ply";
+  if (lava_ && settings_.obj) files["obj"] = "frames/skin.####.obj";
+  if (lava_ && settings_.glb) files["glb"] = "frames/skin.####.glb";
+  if (lava_ && settings_.vdb) files["vdb"] = "frames/lava.####.vdb";
   if (settings_.preview) files["preview"] = "preview/preview.####.png";
   m["files"] = files;
   for (const auto& [name, path] : flow) m["flow"][name] = path;

@@ -51,6 +51,7 @@ class FrameWriter {
   const geometry::Terrain& terrain_;
   const SolidThings& solids_;
   std::filesystem::path folder_;
+  bool lava_ = false;  // or bodies alone: no skin
   std::unique_ptr<skin::Preview> preview_;
   skin::SurfaceCache last_;  // saves work, changes nothing
 };

@@ -1,8 +1,11 @@
 #include "samples/effuse/load_scene.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "flow/effects/registry.h"
+#include "geometry/terrain/plane.h"
 #include "geometry/base/hash.h"
 #include "geometry/base/zones.h"
 #include "importers/scene/scene_file.h"
@@ -69,16 +72,25 @@ std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const
       for (const Fault& fault : error.faults()) faults.push_back({scene.terrain_place, to_string(fault)});
     }
   }
+  if (scene.plane && scene.plane->size.minCoeff() > 0) {
+    loaded->terrain = geometry::Terrain::from_height_field(geometry::make_plane(scene.plane->size, scene.plane->slope, scene.plane->downhill), {}, scene.ground_temperature);
+    loaded->notes.push_back(fmt::format("plane of {:g} x {:g} m, slope {:.3g} deg", scene.plane->size.x(), scene.plane->size.y(), scene.plane->slope * 180 / kPi));
+  }
   if (loaded->terrain) {
     loaded->solids.obstacles = load_obstacles(scene, file.parent_path(), *loaded->terrain, faults, loaded->notes);
     loaded->solids.bodies = load_bodies(scene, file.parent_path(), *loaded->terrain, faults, loaded->notes);
+    SolidThings& solids = loaded->solids;
+    if (solids.obstacles.size() == scene.obstacles.size() && solids.bodies.size() == scene.bodies.size())
+      solids.joints = load_joints(scene, solids.obstacles, solids.bodies, *loaded->terrain, faults, loaded->notes);
   }
+  const auto world = [&] { return flow::World{&*loaded->terrain, scene.seed, &loaded->solids.obstacles, &loaded->solids.bodies, &loaded->solids.joints, scene.body_settings}; };
   if (!faults.empty() && loaded->terrain) {
     for (const flow::EffectPlan& plan : scene.effects)
-      for (const Fault& fault : plan.misfits(flow::World{&*loaded->terrain, scene.seed, &loaded->solids.obstacles, &loaded->solids.bodies})) faults.push_back(fault);
+      for (const Fault& fault : plan.misfits(world())) faults.push_back(fault);
   }
   if (faults.empty() && loaded->terrain) {
-    loaded->simulation = std::make_unique<flow::Simulation>(scene, flow::World{&*loaded->terrain, scene.seed, &loaded->solids.obstacles, &loaded->solids.bodies});
+    loaded->simulation = std::make_unique<flow::Simulation>(scene, world());
+    loaded->solids.make_looks();
     check_map(loaded->skin, *loaded->terrain, *loaded->simulation);
     skin::check_camera(loaded->skin, *loaded->terrain, scene.frames, scene.fps);
     flow::Node resolved = root.resolved();
@@ -90,10 +102,10 @@ std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const
       return node_of;
     };
     for (auto& [name, table] : resolved.entries) {
-      if (name == "terrain") table.set("file", whole(terrain_path));
+      if (name == "terrain" && !scene.plane) table.set("file", whole(terrain_path));
       if (name != "obstacle" && name != "body") continue;
       for (flow::Node& one : table.items)
-        if (const flow::Node* path = one.find("file")) one.set("file", whole(std::filesystem::absolute(file.parent_path() / path->text).lexically_normal()));
+        if (const flow::Node* path = one.find("file"); path && !path->text.empty()) one.set("file", whole(std::filesystem::absolute(file.parent_path() / path->text).lexically_normal()));
     }
     loaded->resolved = importers::to_toml(resolved);
     loaded->key = state_key(resolved, *loaded->terrain, loaded->solids);

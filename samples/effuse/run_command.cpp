@@ -231,7 +231,8 @@ ExitCode run(const RunCommand& command, const CommonOptions& common) {
   for (const std::string& note : loaded->notes) log_info("terrain: " + note);
   double particles = 0;
   for (const flow::EffectPlan& plan : scene.effects) particles += plan.estimate.particles;
-  if (particles < 1) log_warning("not one particle will come out within the film: look at rate, start and spacing");
+  const bool lava = std::any_of(simulation.effects().begin(), simulation.effects().end(), [](const auto& effect) { return effect->spacing() > 0; });
+  if (lava && particles < 1) log_warning("not one particle will come out within the film: look at rate, start and spacing");
 
   const fs::path folder = command.folder.empty() ? default_folder(command.scene) : command.folder;
   std::error_code no_folder;
@@ -337,6 +338,9 @@ ExitCode run(const RunCommand& command, const CommonOptions& common) {
       log_warning(fmt::format("{}: in {:.0f} of {:.0f} steps a solve did not reach its tolerance (run.json: largest_divergence_error, "
                               "largest_viscosity_residual); a shorter max_step or more max_iterations would help",
                               effect->name(), unsolved, steps));
+    if (figures["crushed"] > 0 || figures["stopped"] > 0)
+      log_warning(fmt::format("{}: among obstacles {:.0f} times a particle found no room and {:.0f} times too many surfaces in one step (flow.csv: crushed, stopped): some may be on the wrong side of the last that came",
+                              effect->name(), figures["crushed"], figures["stopped"]));
   }
   if (code == ExitCode::kInterrupted) log_warning("interrupted; this goes on: " + resume_line(command, common.program, folder));
   if (code == ExitCode::kUnstable) {

@@ -4,25 +4,36 @@
 
 #include <algorithm>
 
+#include "geometry/base/check.h"
 #include "geometry/procedural/primitives.h"
 #include "importers/mesh/import_mesh.h"
+#include "samples/effuse/solid_look.h"
 
 namespace effuse {
 
 namespace {
-constexpr float kGrey[] = {0.42f, 0.40f, 0.37f};  // linear light
-constexpr float kAir = 288;                       // [K]
+constexpr float kAir = 288;  // [K]
+
+/// The mesh of a plan: its file's, relative to the scene's folder, or its box or ball.
+geometry::TriMesh mesh_of(const flow::PlannedForm& form, const std::filesystem::path& folder) {
+  if (form.file.empty()) return flow::mesh_of(form);
+  const std::filesystem::path path = std::filesystem::path(form.file).is_relative() ? folder / form.file : std::filesystem::path(form.file);
+  return importers::import_mesh(path).mesh;
+}
+
+/// One without a form has been told of.
+bool has_form(const flow::PlannedForm& form) { return !form.file.empty() || form.ball > 0 || form.box.minCoeff() > 0; }
+
 }  // namespace
 
 std::vector<flow::PlacedObstacle> load_obstacles(const flow::Scene& scene, const std::filesystem::path& folder, const geometry::Terrain& terrain, std::vector<Fault>& faults,
                                                  std::vector<std::string>& notes) {
   std::vector<flow::PlacedObstacle> placed;
   for (const flow::PlannedObstacle& plan : scene.obstacles) {
-    if (plan.file.empty()) continue;  // told already
-    const std::filesystem::path path = std::filesystem::path(plan.file).is_relative() ? folder / plan.file : std::filesystem::path(plan.file);
+    if (!has_form(plan)) continue;
     try {
       const std::size_t before = placed.size();
-      flow::place_obstacle(plan, importers::import_mesh(path).mesh, terrain, placed, faults);
+      flow::place_obstacle(plan, mesh_of(plan, folder), terrain, placed, faults);
       if (placed.size() > before) notes.push_back(fmt::format("obstacle '{}': {}", plan.name, geometry::to_string(placed.back().shape.report())));
     } catch (const InputError& error) {
       for (const Fault& fault : error.faults()) faults.push_back({plan.file_place, to_string(fault)});
@@ -34,61 +45,115 @@ std::vector<flow::PlacedObstacle> load_obstacles(const flow::Scene& scene, const
 std::vector<flow::PlacedBody> load_bodies(const flow::Scene& scene, const std::filesystem::path& folder, const geometry::Terrain& terrain, std::vector<Fault>& faults,
                                           std::vector<std::string>& notes) {
   std::vector<flow::PlacedBody> placed;
+  std::string first;  // of those that are alike, by name
+  const auto same = [](const flow::PlacedBody& a, const flow::PlacedBody& b) { return a.volume == b.volume && a.density == b.density; };
   for (const flow::PlannedBody& plan : scene.bodies) {
-    if (plan.file.empty()) continue;  // told already
-    const std::filesystem::path path = std::filesystem::path(plan.file).is_relative() ? folder / plan.file : std::filesystem::path(plan.file);
+    if (!has_form(plan)) continue;
     try {
       const std::size_t before = placed.size();
-      flow::place_body(plan, importers::import_mesh(path).mesh, terrain, placed, faults);
-      if (placed.size() > before) notes.push_back(fmt::format("body '{}': {:.4g} m3, {:.4g} kg", plan.name, placed.back().volume, placed.back().volume * plan.density));
+      flow::place_body(plan, mesh_of(plan, folder), terrain, placed, faults);
+      if (placed.size() == before) continue;
+      const std::string what = fmt::format("{:.4g} m3, {:.4g} kg{}", placed.back().volume, placed.back().volume * plan.density,
+                                           placed.back().cells ? fmt::format(", {} cells, breaks at {:.4g} Pa", placed.back().cells->cells.size(), placed.back().strength) : "");
+      if (before > 0 && same(placed[before - 1], placed.back())) {
+        notes.back() = fmt::format("bodies '{}' to '{}': {} each", first, plan.name, what);
+      } else {
+        first = plan.name;
+        notes.push_back(fmt::format("body '{}': {}", first, what));
+      }
     } catch (const InputError& error) {
-      for (const Fault& fault : error.faults()) faults.push_back({plan.file_place, to_string(fault)});
+      for (const Fault& fault : error.faults())
+        if (faults.empty() || to_string(faults.back()) != to_string(Fault{plan.file_place, to_string(fault)})) faults.push_back({plan.file_place, to_string(fault)});
     }
   }
   return placed;
+}
+
+std::vector<flow::PlacedJoint> load_joints(const flow::Scene& scene, const std::vector<flow::PlacedObstacle>& obstacles, const std::vector<flow::PlacedBody>& bodies,
+                                           const geometry::Terrain& terrain, std::vector<Fault>& faults, std::vector<std::string>& notes) {
+  std::vector<flow::PlacedJoint> placed;
+  for (const flow::PlannedJoint& plan : scene.joints) flow::place_joint(plan, obstacles, bodies, terrain, placed, faults);
+  std::size_t first = 0;  // of those of one table
+  for (std::size_t k = 0; k < placed.size() && placed.size() == scene.joints.size(); ++k) {
+    if (k + 1 < placed.size() && scene.joints[k + 1].place.line == scene.joints[first].place.line) continue;
+    const auto what = [&](const flow::PlacedJoint& j) { return fmt::format("{} of '{}' and '{}'", flow::kJointKindNames[static_cast<std::size_t>(j.kind)], j.names[0], j.names[1]); };
+    notes.push_back(k == first ? "joint: " + what(placed[k]) : fmt::format("{} joints: {} to {}", k - first + 1, what(placed[first]), what(placed[k])));
+    first = k + 1;
+  }
+  return placed;
+}
+
+void SolidThings::make_looks() {
+  looks.clear();
+  for (const flow::PlacedObstacle& each : obstacles) looks.push_back(make_look(each.shape.mesh(), each.color, LookKind::kObstacle, 0));
+  std::size_t number[3] = {0, 0, 0};
+  for (const flow::PlacedBody& each : bodies) {
+    const LookKind kind = each.ball > 0 ? LookKind::kBall : each.box ? LookKind::kBox : LookKind::kRock;
+    looks.push_back(make_look(each.mesh, each.color, kind, number[kind == LookKind::kRock]++));
+  }
+}
+
+std::size_t SolidThings::triangles() const {
+  std::size_t sum = 0;
+  for (const flow::PlacedObstacle& each : obstacles) sum += each.shape.mesh().triangles.size();
+  for (const flow::PlacedBody& each : bodies) sum += each.mesh.triangles.size();
+  return sum;
 }
 
 bool SolidThings::any_moves() const {
   return !bodies.empty() || std::any_of(obstacles.begin(), obstacles.end(), [](const flow::PlacedObstacle& each) { return each.track.keys().size() > 1; });
 }
 
-geometry::TriMesh SolidThings::at(Real time, const std::vector<geometry::RigidPose>& poses) const {
+bool SolidThings::any_breaks() const {
+  return std::any_of(bodies.begin(), bodies.end(), [](const flow::PlacedBody& each) { return each.cells != nullptr; });
+}
+
+geometry::TriMesh SolidThings::at(Real time, const std::vector<geometry::RigidPose>& poses, const std::vector<flow::SolidPiece>& pieces) const {
+  CHECK_EQ(looks.size(), obstacles.size() + bodies.size());
   geometry::TriMesh all;
-  const auto add = [&](const geometry::TriMesh& mesh, const geometry::RigidPose& pose) {
-    for (const geometry::Triangle& t : mesh.triangles) {
-      const Vec3 a = pose.world(mesh.positions[t[0]]), b = pose.world(mesh.positions[t[1]]), c = pose.world(mesh.positions[t[2]]);
-      const Vec3 n = (b - a).cross(c - a).normalized();
-      const auto first = static_cast<Index>(all.positions.size());
-      all.triangles.push_back({first, first + 1, first + 2});
-      for (const Vec3& p : {a, b, c}) {
-        all.positions.push_back(p);
-        all.normals.push_back(n);
-      }
-    }
+  geometry::VertexAttribute& color = all.attributes["color"];
+  color.width = 3;
+  const auto add = [&](const geometry::TriMesh& look, const geometry::RigidPose& pose) {
+    const auto first = static_cast<Index>(all.positions.size());
+    for (const geometry::Triangle& t : look.triangles) all.triangles.push_back({first + t[0], first + t[1], first + t[2]});
+    for (const Vec3& p : look.positions) all.positions.push_back(pose.world(p));
+    for (const Vec3& n : look.normals) all.normals.push_back(pose.orientation * n);
+    const std::vector<float>& own = look.attributes.at("color").values;
+    color.values.insert(color.values.end(), own.begin(), own.end());
   };
-  for (const flow::PlacedObstacle& each : obstacles) add(each.shape.mesh(), each.track.at(time));
-  for (std::size_t b = 0; b < bodies.size(); ++b) add(bodies[b].mesh, b < poses.size() ? poses[b] : bodies[b].pose);
+  for (std::size_t i = 0; i < obstacles.size(); ++i) add(looks[i], obstacles[i].track.at(time));
+  for (std::size_t b = 0; b < bodies.size(); ++b)
+    if (!bodies[b].cells || pieces.empty()) add(looks[obstacles.size() + b], b < poses.size() ? poses[b] : bodies[b].pose);
+  if (!any_breaks() && pieces.empty()) return all;
+  std::vector<float> number(all.positions.size(), 0), inner(all.positions.size(), 0);
+  for (const flow::SolidPiece& piece : pieces) {
+    const float* color_of_body = piece.body == flow::SolidPiece::kNoBody ? nullptr : looks[obstacles.size() + piece.body].attributes.at("color").values.data();
+    add(make_piece_look(*piece.mesh, color_of_body, piece.id < bodies.size() ? 0 : piece.id), piece.pose);
+    const std::vector<float>& own_inner = piece.mesh->attributes.at("inner").values;
+    inner.insert(inner.end(), own_inner.begin(), own_inner.end());
+    number.resize(all.positions.size(), static_cast<float>(piece.id + 1));
+  }
+  all.attributes["piece"] = {1, std::move(number)};
+  all.attributes["inner"] = {1, std::move(inner)};
   return all;
 }
 
 geometry::TriMesh in_one_picture(geometry::TriMesh lava, const geometry::TriMesh& obstacles) {
   if (obstacles.triangles.empty()) return lava;
-  geometry::TriMesh grey = obstacles;
-  const std::size_t n = grey.positions.size();
-  if (lava.positions.empty()) {
-    lava = geometry::TriMesh();
-    lava.attributes["color"].width = 3;
-  }
+  geometry::TriMesh cold = obstacles;
+  const std::size_t n = cold.positions.size();
+  if (lava.positions.empty()) return obstacles;
+  // Only what the picture is made of goes on.
+  for (const char* name : {"piece", "inner"}) cold.attributes.erase(name);
   for (const auto& [name, attribute] : lava.attributes) {
-    geometry::VertexAttribute& own = grey.attributes[name];
+    if (name == "color") continue;
+    geometry::VertexAttribute& own = cold.attributes[name];
     own.width = attribute.width;
     own.values.assign(n * static_cast<std::size_t>(attribute.width), name == "temperature" ? kAir : name == "crust" ? 1 : 0.0f);
-    if (name != "color") continue;
-    for (std::size_t k = 0; k < own.values.size(); ++k) own.values[k] = kGrey[k % 3];
   }
-  if (lava.normals.empty() && !lava.positions.empty()) grey.normals.clear();
-  if (lava.positions.empty()) return grey;
-  geometry::append(lava, grey);
+  if (lava.normals.empty()) cold.normals.clear();
+  if (!lava.attributes.contains("color")) cold.attributes.erase("color");
+  geometry::append(lava, cold);
   return lava;
 }
 

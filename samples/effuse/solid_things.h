@@ -3,6 +3,8 @@
 #include <filesystem>
 #include <vector>
 
+#include "flow/scene/effect.h"
+#include "flow/scene/joints.h"
 #include "flow/scene/obstacles.h"
 #include "flow/scene/rigid_bodies.h"
 #include "flow/scene/scene.h"
@@ -19,17 +21,31 @@ std::vector<flow::PlacedObstacle> load_obstacles(const flow::Scene& scene, const
 std::vector<flow::PlacedBody> load_bodies(const flow::Scene& scene, const std::filesystem::path& folder, const geometry::Terrain& terrain, std::vector<Fault>& faults,
                                           std::vector<std::string>& notes);
 
+/// Its joints, among obstacles and bodies of which none was left out.
+std::vector<flow::PlacedJoint> load_joints(const flow::Scene& scene, const std::vector<flow::PlacedObstacle>& obstacles, const std::vector<flow::PlacedBody>& bodies,
+                                           const geometry::Terrain& terrain, std::vector<Fault>& faults, std::vector<std::string>& notes);
+
 /// What is solid in a scene, beside the terrain.
 struct SolidThings {
   std::vector<flow::PlacedObstacle> obstacles;
   std::vector<flow::PlacedBody> bodies;
+  std::vector<flow::PlacedJoint> joints;
+  std::vector<geometry::TriMesh> looks;  ///< of obstacles, then bodies, in their own frames: make_looks()
+  void make_looks();
   bool any() const { return !obstacles.empty() || !bodies.empty(); }
   bool any_moves() const;
-  /// All where they are at a time [s], as one mesh; edges are sharp. poses: of the bodies; empty: where the scene puts them.
-  geometry::TriMesh at(Real time, const std::vector<geometry::RigidPose>& poses = {}) const;
+  /// Triangles of all.
+  std::size_t triangles() const;
+  /// Bytes and seconds that they cost beside the simulation: trees to collide with, looks, a picture or file of a frame.
+  double memory() const { return 1400.0 * static_cast<double>(triangles()); }
+  double frame_seconds() const { return 2e-6 * static_cast<double>(triangles()); }
+  bool any_breaks() const;
+  /// All where they are at a time [s], as one mesh of their looks. poses: of the bodies; empty: where the scene puts them. pieces: instead of
+  /// the bodies that can break. Where there are such: "piece", 0 for the others, and "inner", 1 on faces that breaking has made.
+  geometry::TriMesh at(Real time, const std::vector<geometry::RigidPose>& poses = {}, const std::vector<flow::SolidPiece>& pieces = {}) const;
 };
 
-/// Lava and obstacles for one picture: these in the grey of concrete, cold and dull.
+/// Lava and obstacles for one picture: these cold and dull.
 geometry::TriMesh in_one_picture(geometry::TriMesh lava, const geometry::TriMesh& obstacles);
 
 }  // namespace effuse

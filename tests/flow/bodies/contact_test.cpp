@@ -182,6 +182,91 @@ TEST(Contacts, PenaltyHoldsABoxAtTheSpringsDepth) {
   EXPECT_LT(world.kinetic_energy(), 1e-6);
 }
 
+/// A ball let go where it touches penalty springs, with substeps of this share of the limit: its depth in the end as a share of
+/// m g / k, and the speed it still has [g / omega].
+struct Rest {
+  Real depth = 0, speed = 0;
+};
+Rest rest_on_springs(Real frequency, Real damping, Real share) {
+  BodyOptions options = worlds::awake();
+  options.contact = ContactModel::kPenalty;
+  options.penalty_frequency = frequency;
+  options.penalty_damping = damping;
+  options.penalty_springs = 1e-3;  // no substeps of its own making
+  options.substeps = 1;
+  const Real dt = share * penalty_step_limit(options, 1);
+  options.step = dt;
+  RigidBodies world(options, worlds::plane());
+  world.add(Shape::sphere(0.5), 1000, at(0, 0, 0.5));
+  Real fastest = 0;
+  const int steps = 2000;
+  for (int k = 0; k < steps; ++k) {
+    world.step(dt);
+    if (k > 0.9 * steps) fastest = std::max(fastest, std::abs(world.momenta()[0].z()) / world.mass(0));
+  }
+  const Real omega = 2 * kPi * frequency;
+  return {(0.5 - world.centres()[0].z()) * omega * omega / kGravity, fastest * omega / kGravity};
+}
+
+TEST(Contacts, PenaltyRestsAtMgOverKUpToItsStepLimitAndNotBeyond) {
+  for (const Real frequency : {10.0, 60.0, 500.0})
+    for (const Real damping : {0.1, 0.5, 1.0}) {
+      SCOPED_TRACE(testing::Message() << frequency << " 1/s, damping " << damping);
+      const Rest below = rest_on_springs(frequency, damping, 0.98), beyond = rest_on_springs(frequency, damping, 1.02);
+      EXPECT_NEAR(below.depth, 1, 1e-3);
+      EXPECT_LT(below.speed, 1e-6);
+      EXPECT_GT(beyond.speed, 0.1) << "it comes to rest where the formula says that it cannot";
+    }
+}
+
+TEST(Contacts, PenaltyGivesBackNoMoreThanItGot) {
+  // An impact is met up to a substep late. Without a damper the spring gives back what it took, more or less by how late.
+  Real most = 0, sum = 0;
+  for (int k = 0; k < 40; ++k) {
+    BodyOptions options = worlds::weightless();
+    options.contact = ContactModel::kPenalty;
+    options.penalty_damping = 0;
+    RigidBodies world(options, worlds::plane());
+    world.add(Shape::sphere(0.5), 1000, at(0, 0, 0.52 + 1e-4 * k), {}, Vec3(0, 0, -1));
+    worlds::run(world, 0.2);
+    const Real back = world.momenta()[0].z() / world.mass(0);
+    most = std::max(most, back);
+    sum += back / 40;
+  }
+  EXPECT_LT(most, 1.1);
+  EXPECT_NEAR(sum, 1, 0.02);
+}
+
+TEST(Friction, WithPenaltyHoldsABoxOnASlopeWithoutCreep) {
+  const Real slope = 0.3;
+  BodyOptions options = worlds::awake();
+  options.contact = ContactModel::kPenalty;
+  RigidBodies world(options, worlds::plane(slope));
+  const Vec3 up(std::sin(slope), 0, std::cos(slope)), down(std::cos(slope), 0, -std::sin(slope));
+  const BodyId id = world.add(Shape::box(Vec3(0.5, 0.5, 0.25)), 1000, {0.25 * up, Quat(Eigen::AngleAxisd(slope, Vec3::UnitY()))});
+  worlds::run(world, 1);
+  const Vec3 x = world.centres()[id];
+  worlds::run(world, 2);
+  EXPECT_LT(std::abs((world.centres()[id] - x).dot(down)), 1e-6);
+}
+
+TEST(Contacts, PenaltyTakesAsManySubstepsAsItsSpringsNeed) {
+  BodyOptions options = worlds::awake();
+  options.contact = ContactModel::kPenalty;
+  for (const Real frequency : {60.0, 1000.0}) {
+    options.penalty_frequency = frequency;
+    RigidBodies world(options, worlds::plane());
+    for (int k = 0; k < 3; ++k) world.add(Shape::box(Vec3::Constant(0.5)), 1000, at(0, 0, 0.5 + k));
+    const BodyReport report = world.step(1.0 / 120);
+    EXPECT_LE(1.0 / 120 / report.substeps, penalty_step_limit(options, 4) * (1 + 1e-6));
+    worlds::run(world, 2);
+    EXPECT_LT(world.kinetic_energy(), 1e-6 * world.mass(0));
+    // Each spring carries what lies above it: with the reduced mass of two equal boxes it is half as stiff as on the ground.
+    const Real omega = 2 * kPi * frequency, one = kGravity / (omega * omega);
+    EXPECT_NEAR(2.5 - world.centres()[2].z(), (3 + 2 * 2 + 2 * 1) * one, 0.02 * 9 * one);
+  }
+}
+
 TEST(Contacts, ABallInAGrooveTouchesBothSides) {
   // Walls of 45 deg: the ball's centre stands r sqrt(2) above the bottom line.
   geometry::TriMesh groove;

@@ -224,6 +224,83 @@ TEST(Joints, ASpringOfAnyStiffnessHangsWhereItShouldAndIsStable) {
   }
 }
 
+TEST(Joints, ToTheWorldHoldAsThoseToAStaticBodyDoBitForBit) {
+  // A chain of each kind of joint, hung from a nail and from the world, at the nail's place.
+  std::vector<Vec3> ends;
+  for (const bool world_itself : {false, true}) {
+    RigidBodies world(worlds::awake());
+    const BodyId hook = nail(world, Vec3(0, 0, world_itself ? 100 : 0));  // in both, so that bodies have the same numbers
+    const auto bar = Shape::box(Vec3(0.25, 0.05, 0.05));
+    BodyId last = world_itself ? Joint::kWorld : hook;
+    for (int k = 0; k < 3; ++k) {
+      const BodyId next = world.add(bar, 1000, at(0.25 + 0.5 * k, 0, 0));
+      Joint j = make(k == 1 ? Kind::kBall : Kind::kHinge, last, next, Vec3(0.5 * k, 0, 0));
+      if (k == 0) j.high = 0.4;
+      world.join(j);
+      last = next;
+    }
+    Joint rope = make(Kind::kDistance, world_itself ? Joint::kWorld : hook, last, Vec3::Zero());
+    rope.anchor_b = Vec3(1.5, 0, 0);
+    rope.low = 0;
+    rope.high = 1.6;
+    world.join(rope);
+    worlds::run(world, 2);
+    ends.push_back(world.centres()[last]);
+    EXPECT_LT(world.joint_error(0), 1e-6);
+    world.unjoin(0);
+    worlds::run(world, 0.1);
+  }
+  EXPECT_EQ(ends[0], ends[1]);
+}
+
+TEST(Joints, AHingesSpringSwingsAtItsPeriodAndItsDamperStopsIt) {
+  // A bar of length 1 about its end, without weight: I = m (1/3 + 0.01/12) about the pin.
+  for (const Real damping : {0.0, 10.0}) {
+    RigidBodies world(worlds::weightless());
+    const BodyId bar = world.add(Shape::box(Vec3(0.5, 0.05, 0.05)), 1000, at(0.5, 0, 0));
+    Joint hinge = make(Kind::kHinge, Joint::kWorld, bar, Vec3::Zero());
+    hinge.stiffness = 100;
+    hinge.damping = damping;
+    const JointId id = world.join(hinge);
+    const Real I = world.mass(bar) * (1.0 / 3 + 0.01 / 12), omega = std::sqrt(hinge.stiffness / I);
+    world.add_impulse(bar, Vec3(0, 0, -1), Vec3(1, 0, 0));  // turns it by the positive sense about +y
+    const Real decay = damping / (2 * I), swing = std::sqrt(omega * omega - decay * decay);
+    Real crossing = 0, before = 0;
+    while (crossing == 0 && world.time() < 10) {
+      world.step(1.0 / 120);
+      const Real now = world.joint_position(id);
+      if (before > 0 && now <= 0) crossing = world.time() + now / (before - now) / 120;
+      before = now;
+    }
+    // Implicit: of first order in the substep h = 1/480 s, off by less than omega h.
+    EXPECT_NEAR(crossing * swing / kPi, 1, omega / 480) << damping;
+    worlds::run(world, 20);
+    if (damping > 0) { EXPECT_LT(world.kinetic_energy(), 1e-9); }
+  }
+}
+
+TEST(Joints, ADamperAloneTakesASlidersSpeedAsTheExponentialSays) {
+  RigidBodies world(worlds::weightless());
+  const BodyId block = world.add(Shape::box(Vec3::Constant(0.1)), 1000, at(0, 0, 0));
+  Joint slider = make(Kind::kSlider, Joint::kWorld, block, Vec3::Zero(), Vec3::UnitX());
+  slider.damping = 16;  // of 8 kg: e-fold in half a second
+  world.join(slider);
+  world.add_impulse(block, Vec3(8, 0, 0), Vec3::Zero());
+  worlds::run(world, 1);
+  EXPECT_NEAR(world.momenta()[block].x() / 8, std::exp(-2.0), 1e-2 * std::exp(-2.0));
+}
+
+TEST(Sleep, ASlowMotorGoesOn) {
+  RigidBodies world;
+  const BodyId arm = world.add(Shape::box(Vec3(0.5, 0.05, 0.05)), 1000, at(0, 0, 0));
+  Joint hinge = make(Kind::kHinge, Joint::kWorld, arm, Vec3::Zero(), Vec3::UnitZ());
+  hinge.motor_speed = 0.02;  // its end at a centimetre a second, under sleep_speed
+  hinge.motor_strength = 1e4;
+  const JointId id = world.join(hinge);
+  worlds::run(world, 5);
+  EXPECT_NEAR(world.joint_position(id), 0.1, 1e-3);
+}
+
 TEST(Joints, ALoopThatIsHeldMoreThanOnceStaysWhole) {
   // A flat ring of four bars: hinges with parallel axes hold it three times more than they must.
   RigidBodies world(worlds::weightless());
@@ -268,7 +345,11 @@ TEST(Joints, RefuseWhatMakesNoSense) {
   refused([](Joint& j) { j.high = 4; });
   refused([](Joint& j) { j.kind = Kind::kFixed, j.low = -1; });
   refused([](Joint& j) { j.kind = Kind::kBall, j.motor_strength = 1; });
-  refused([](Joint& j) { j.stiffness = 1; });
+  refused([](Joint& j) { j.kind = Kind::kBall, j.stiffness = 1; });
+  refused([](Joint& j) { j.stiffness = 1, j.motor_strength = 1; });
+  refused([](Joint& j) { j.kind = Kind::kDistance, j.anchor_b = Vec3::Zero(), j.damping = 1; });
+  refused([&](Joint& j) { j.a = Joint::kWorld, j.b = d; });
+  refused([](Joint& j) { j.a = j.b = Joint::kWorld; });
   refused([](Joint& j) { j.anchor.x() = std::nan(""); });
   refused([](Joint& j) { j.kind = Kind::kDistance, j.anchor_b = j.anchor; });
   EXPECT_NO_THROW(world.join(make(Kind::kHinge, a, b, Vec3(1.5, 0, 0))));
