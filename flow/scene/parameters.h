@@ -43,6 +43,8 @@ class Parameters {
   std::int64_t integer(const std::string& key, std::optional<std::int64_t> fallback, std::int64_t low, std::int64_t high, std::string_view what);
   bool flag(const std::string& key, bool fallback, std::string_view what);
   std::string text(const std::string& key, std::optional<std::string> fallback, std::string_view what);
+  /// One text, or an array of them; required, and none is empty.
+  std::vector<std::string> texts(const std::string& key, std::string_view what);
   /// Index into names of the one given.
   std::size_t choice(const std::string& key, const std::vector<std::string>& names, std::size_t fallback, std::string_view what);
   /// Several of names: indices, in the order given; fallback when the key is absent.

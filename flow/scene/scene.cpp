@@ -15,12 +15,7 @@ Scene read_scene(Parameters& root, std::span<const EffectKind> kinds) {
   scene.fps = film.number("fps", "1/s", 24, Parameters::positive(), "frames a second of film");
   scene.time_scale = film.number("time_scale", "", 1, Parameters::positive(), "simulated seconds a second of film: 30 is a time lapse");
 
-  Parameters terrain = root.table("terrain", "the ground");
-  scene.terrain_file = terrain.text("file", std::nullopt, "DEM grid or mesh, relative to the scene file");
-  scene.terrain_place = terrain.place("file");
-  if (terrain.has("file") && (scene.terrain_file.empty() || scene.terrain_file.find('\0') != std::string::npos)) terrain.fault("file", "is not the name of a file");
-  scene.terrain_crs = terrain.text("crs", "", "coordinate system, when the file says none or a wrong one");
-  scene.ground_temperature = terrain.number("temperature", "K", 288.15, {0, 5000, true}, "of the ground");
+  scene.terrain = read_terrain_settings(root);
 
   scene.obstacles = read_obstacles(root);
   scene.bodies = read_bodies(root);

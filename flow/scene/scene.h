@@ -7,6 +7,7 @@
 
 #include "flow/scene/effect.h"
 #include "flow/scene/parameters.h"
+#include "flow/scene/terrain_settings.h"
 
 namespace effuse::flow {
 
@@ -17,10 +18,7 @@ struct Scene {
   int frames = 0;
   Real fps = 24;
   Real time_scale = 1;          ///< simulated seconds a second of film
-  std::string terrain_file;     ///< as written; relative to the scene file
-  Place terrain_place;
-  std::string terrain_crs;      ///< "": as the file says
-  Real ground_temperature = 0;  ///< [K]
+  TerrainSettings terrain;
   std::vector<PlannedObstacle> obstacles;
   std::vector<PlannedBody> bodies;
   std::vector<EffectPlan> effects;
