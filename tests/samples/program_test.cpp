@@ -406,6 +406,21 @@ TEST_F(ProgramTest, TellsBodiesAndJointsOfAScene) {
   EXPECT_EQ(count(wrong.err, "error: "), 1u) << wrong.err;
 }
 
+TEST_F(ProgramTest, TheReadmesChainIsAScene) {
+  const std::string readme = read_file(kScenes.parent_path().parent_path() / "README.md");
+  const std::size_t from = readme.find("[terrain.plane]"), to = readme.find("```", from);
+  ASSERT_NE(to, std::string::npos);
+  std::string text = readme.substr(from, to - from);
+  const Outcome plain = effuse({"check", write("readme.toml", "[film]\nframes = 24\n" + text)});
+  EXPECT_EQ(plain.code, 0) << plain.err;
+  EXPECT_NE(plain.out.find("10 bodies"), std::string::npos) << plain.out;
+  // What it says in comments does, too.
+  text.replace(text.find("# spring"), 2, "");
+  text.replace(text.find("kind = \"ball\""), 13, "kind = \"ball\"\ncone = \"40 deg\"\naxis = [1, 0, 0]");
+  const Outcome more = effuse({"check", write("readme.toml", "[film]\nframes = 24\n[bodies]\ncontact = \"penalty\"\npenalty_frequency = 50\n" + text)});
+  EXPECT_EQ(more.code, 0) << more.err;
+}
+
 TEST_F(ProgramTest, NamesWhatBlocksAVentWhenItCannotGoOn) {
   std::string text = read_file(kScenes / "house.toml");
   const auto put = [&](const std::string& from, const std::string& to) { text.replace(text.find(from), from.size(), to); };
