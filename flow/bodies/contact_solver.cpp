@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "flow/bodies/rigid_bodies.h"
 #include "geometry/base/check.h"
 
 namespace effuse::flow::bodies {
@@ -188,6 +189,19 @@ void ContactSolver::rebound() {
     const Real total = std::max(Real{0}, c.push - c.mass * (vn + c.restitution * c.approach));
     apply(c, (total - c.push) * c.n);
     c.push = total;
+  }
+}
+
+void ContactSolver::book(std::span<const std::uint8_t> wanted, int substep, std::vector<ContactLoad>& out) const {
+  for (const Place& c : places_) {
+    if (c.push == 0 && c.drag1 == 0 && c.drag2 == 0) continue;
+    const Vec3 P = c.push * c.n + c.drag1 * c.t1 + c.drag2 * c.t2;
+    for (const bool first : {true, false}) {
+      const Index i = first ? c.a : c.b;
+      if (i >= wanted.size() || !wanted[i]) continue;
+      const Mat3 to_body = bodies_[i].q.conjugate().toRotationMatrix();
+      out.push_back({i, substep, to_body * (first ? c.ra : c.rb), to_body * (first ? Vec3(-P) : P)});
+    }
   }
 }
 

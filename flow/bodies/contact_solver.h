@@ -8,6 +8,8 @@
 
 namespace effuse::flow::bodies {
 
+struct ContactLoad;
+
 /// What two surfaces are to each other.
 struct PairSurface {
   Real friction = 0, restitution = 0, rolling = 0;
@@ -39,6 +41,8 @@ class ContactSolver {
   void penalty();
   void rub_all();
   void rebound();
+  /// What each place has given in this substep to bodies whose flag is set.
+  void book(std::span<const std::uint8_t> wanted, int substep, std::vector<ContactLoad>& out) const;
   /// Impulses back into the points; the deepest overlap where the bodies were at the last prepare().
   Real finish();
 

@@ -38,8 +38,11 @@ bool probe(const PlacedShape& B, const Vec3& p, const Vec3& viewer, Real reach, 
       out.surface = B.x + B.shape->radius() * out.outward;
       break;
     }
-    case Kind::kHull: {
-      const geometry::HullPoint at = geometry::nearest_on_hull(B.hull, p);
+    case Kind::kHull:
+    case Kind::kParts: {
+      geometry::HullPoint at = geometry::nearest_on_hull(B.hulls[0], p);
+      for (std::size_t k = 1; k < B.hulls.size(); ++k)
+        if (const geometry::HullPoint other = geometry::nearest_on_hull(B.hulls[k], p); other.distance < at.distance) at = other;
       out.outward = at.normal;
       out.distance = at.distance;
       out.surface = at.point;
@@ -167,13 +170,48 @@ void probe_sphere(const PlacedShape& S, bool sphere_is_a, std::span<const Contac
   }
 }
 
+/// Every part of A against every part of B whose boxes come within the margin.
+void collide_parts(Index a, const PlacedShape& A, Index b, const PlacedShape& B, Real margin, std::vector<ContactPoint>& out) {
+  const auto box_of = [](const PlacedShape& S, std::size_t k) { return S.boxes.empty() ? S.shape->bounds(S.x, S.R) : S.boxes[k]; };
+  const Real slop = kSlop * std::min(A.shape->bounding_radius(), B.shape->bounding_radius());
+  const std::size_t na = std::max<std::size_t>(A.hulls.size(), 1), nb = std::max<std::size_t>(B.hulls.size(), 1);
+  Box3 whole_b = B.shape->bounds(B.x, B.R);
+  whole_b = Box3(whole_b.min() - Vec3::Constant(margin), whole_b.max() + Vec3::Constant(margin));
+  for (std::size_t i = 0; i < na; ++i) {
+    Box3 near = box_of(A, i);
+    if (!near.intersects(whole_b)) continue;
+    near = Box3(near.min() - Vec3::Constant(margin), near.max() + Vec3::Constant(margin));
+    for (std::size_t j = 0; j < nb; ++j) {
+      if (!near.intersects(box_of(B, j))) continue;
+      geometry::Manifold m;
+      if (A.hulls.empty()) {
+        m = geometry::hull_sphere_contact(B.hulls[j], A.x, A.shape->radius(), margin);
+        m.normal = -m.normal;
+        std::swap(m.points[0].on_a, m.points[0].on_b);
+        m.points[0].of_a = 1;
+      } else if (B.hulls.empty()) {
+        m = geometry::hull_sphere_contact(A.hulls[i], B.x, B.shape->radius(), margin);
+      } else {
+        m = geometry::hull_contact(A.hulls[i], B.hulls[j], margin, slop);
+      }
+      for (const ManifoldPoint& p : m.all()) append(a, A, b, &B, p.on_a, p.on_b, m.normal, p.separation, p.of_a, out);
+    }
+  }
+}
+
 }  // namespace
 
 void PlacedShape::place(const Shape& s, const Vec3& centre, const Mat3& orientation) {
   shape = &s;
   x = centre;
   R = orientation;
-  if (s.kind() == Kind::kHull) geometry::transform_into(s.hull(), R, x, hull);
+  hulls.resize(s.hulls().size());
+  boxes.resize(hulls.size() > 1 ? hulls.size() : 0);
+  for (std::size_t k = 0; k < hulls.size(); ++k) geometry::transform_into(s.hulls()[k], R, x, hulls[k]);
+  for (std::size_t k = 0; k < boxes.size(); ++k) {
+    boxes[k].setEmpty();
+    for (const Vec3& v : hulls[k].vertices) boxes[k].extend(v);
+  }
 }
 
 GroundShape::GroundShape(geometry::Terrain terrain) : terrain_(std::move(terrain)) {
@@ -211,20 +249,25 @@ void GroundShape::points_near(const Box3& box, F&& f) const {
 void collide(Index a, const PlacedShape& A, Index b, const PlacedShape& B, std::span<const ContactPoint> before, std::vector<ContactPoint>& out) {
   const Real margin = std::max(A.margin, B.margin);
   const Kind ka = A.shape->kind(), kb = B.shape->kind();
-  if (ka != Kind::kMesh && kb != Kind::kMesh) {
+  if (ka == Kind::kParts || kb == Kind::kParts) {
+    if (ka != Kind::kMesh && kb != Kind::kMesh) {
+      collide_parts(a, A, b, B, margin, out);
+      return;
+    }
+  } else if (ka != Kind::kMesh && kb != Kind::kMesh) {
     geometry::Manifold m;
     if (ka == Kind::kSphere && kb == Kind::kSphere) {
       m = geometry::sphere_contact(A.x, A.shape->radius(), B.x, B.shape->radius(), margin);
     } else if (kb == Kind::kSphere) {
-      m = geometry::hull_sphere_contact(A.hull, B.x, B.shape->radius(), margin);
+      m = geometry::hull_sphere_contact(A.hulls[0], B.x, B.shape->radius(), margin);
     } else if (ka == Kind::kSphere) {
-      m = geometry::hull_sphere_contact(B.hull, A.x, A.shape->radius(), margin);
+      m = geometry::hull_sphere_contact(B.hulls[0], A.x, A.shape->radius(), margin);
       m.normal = -m.normal;
       std::swap(m.points[0].on_a, m.points[0].on_b);
       m.points[0].of_a = 1;
     } else {
       const Real slop = kSlop * std::min(A.shape->bounding_radius(), B.shape->bounding_radius());
-      m = geometry::hull_contact(A.hull, B.hull, margin, slop);
+      m = geometry::hull_contact(A.hulls[0], B.hulls[0], margin, slop);
     }
     for (const ManifoldPoint& p : m.all()) append(a, A, b, &B, p.on_a, p.on_b, m.normal, p.separation, p.of_a, out);
     return;
@@ -263,12 +306,25 @@ void collide_terrain(Index a, const PlacedShape& A, const GroundShape& ground, s
   Probe p;
   if (!ask(A.x, bound + A.margin, p) && terrain.bounds().contains(A.x)) return;
   const bool fine = ground.finer_than(2 * bound);
-  const std::vector<Vec3>& samples = A.shape->samples();
-  const std::size_t count = fine ? samples.size() : A.shape->corners();
-  for (std::size_t i = 0; i < count; ++i)
-    if (ask(A.x + A.R * samples[i], A.margin, p)) found.push_back(p);
-  thin_out(found);
-  append_probes(a, A, kTerrain, nullptr, found, true, out);
+  if (A.shape->kind() == Kind::kParts) {
+    // Each part stands on its own corners: a wall on five places in all would be loaded as no wall is.
+    for (std::size_t k = 0; k < A.hulls.size(); ++k) {
+      const Vec3 middle = A.boxes[k].center();
+      if (!ask(middle, A.boxes[k].diagonal().norm() / 2 + A.margin, p) && terrain.bounds().contains(middle)) continue;
+      found.clear();
+      for (const Vec3& corner : A.hulls[k].vertices)
+        if (ask(corner, A.margin, p)) found.push_back(p);
+      thin_out(found);
+      append_probes(a, A, kTerrain, nullptr, found, true, out);
+    }
+  } else {
+    const std::vector<Vec3>& samples = A.shape->samples();
+    const std::size_t count = fine ? samples.size() : A.shape->corners();
+    for (std::size_t i = 0; i < count; ++i)
+      if (ask(A.x + A.R * samples[i], A.margin, p)) found.push_back(p);
+    thin_out(found);
+    append_probes(a, A, kTerrain, nullptr, found, true, out);
+  }
   if (!fine) return;
 
   // Points of the ground that stick into the body.
@@ -310,7 +366,11 @@ Real first_touch(const PlacedShape& B, const geometry::RigidMotion& motion, cons
   for (int k = 0; k < kMarches; ++k) {
     const geometry::RigidPose pose = motion.pose(t);
     const Vec3 p = pose.body(x + t * d);
-    const Real distance = B.shape->kind() == Kind::kSphere ? p.norm() - B.shape->radius() : geometry::nearest_on_hull(B.shape->hull(), p).distance;
+    Real distance = p.norm() - B.shape->radius();
+    if (B.shape->kind() != Kind::kSphere) {
+      distance = std::numeric_limits<Real>::infinity();
+      for (const geometry::ConvexHull& hull : B.shape->hulls()) distance = std::min(distance, geometry::nearest_on_hull(hull, p).distance);
+    }
     const Real gap = distance - radius;
     if (gap <= kTouching * radius) return t > 0 ? t : 1;
     t += gap / speed;

@@ -33,7 +33,8 @@ struct PlacedShape {
   const Shape* shape = nullptr;
   Vec3 x = Vec3::Zero();
   Mat3 R = Mat3::Identity();
-  geometry::ConvexHull hull;  ///< of hulls: in the world
+  std::vector<geometry::ConvexHull> hulls;  ///< of a hull and of parts: in the world
+  std::vector<Box3> boxes;    ///< of parts
   Real margin = 0;            ///< [m]: contacts are made this far ahead
 
   void place(const Shape& s, const Vec3& centre, const Mat3& orientation);

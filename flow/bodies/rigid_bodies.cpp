@@ -15,7 +15,7 @@ using geometry::RigidPose;
 
 namespace {
 
-constexpr std::string_view kModel = "rigid bodies 1";
+constexpr std::string_view kModel = "rigid bodies 2";
 constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
 
 RigidPose combined(const RigidPose& a, const RigidPose& b) { return {a.world(b.position), (a.orientation * b.orientation).normalized()}; }
@@ -71,6 +71,7 @@ BodyId RigidBodies::Impl::add(std::shared_ptr<const Shape> s, Role r, Real densi
   torque.push_back(Vec3::Zero());
   target.push_back(body);
   driven_now.push_back(0);
+  recorded.push_back(0);
   placed.emplace_back();
   placed_well.push_back(0);
   motion.emplace_back(body);
@@ -205,6 +206,76 @@ Mat3 RigidBodies::inverse_mass_at(BodyId id, const Vec3& at) const {
   return Mat3::Identity() / m.mass[id] - cross * m.solver_body(id).iI * cross;
 }
 
+// ---- breaking --------------------------------------------------------------------------------------------------------
+
+void RigidBodies::retire(BodyId id) {
+  Impl& m = *impl_;
+  CHECK_LT(id, m.size());
+  CHECK(m.role[id] != Role::kGone);
+  m.wake_group(id);
+  for (const ContactPoint& c : m.points)
+    if (c.b != kTerrain && (c.a == id || c.b == id)) m.wake_group(c.a == id ? c.b : c.a);
+  std::erase_if(m.points, [&](const ContactPoint& c) { return c.a == id || c.b == id; });
+  m.role[id] = Role::kGone;
+  m.p[id].setZero();
+  m.L[id].setZero();
+  m.force[id].setZero();
+  m.torque[id].setZero();
+  m.recorded[id] = 0;
+  if (m.broad && id < m.broad->size()) m.broad->remove(id);
+}
+
+void RigidBodies::hand_joints(BodyId from, const std::function<BodyId(const Vec3&)>& to) {
+  Impl& m = *impl_;
+  for (JointState& j : m.joints) {
+    if (j.broken) continue;
+    for (const bool first : {true, false}) {
+      BodyId& id = first ? j.joint.a : j.joint.b;
+      if (id != from) continue;
+      Vec3& anchor = first ? j.anchor_a : j.anchor_b;
+      Quat& frame = first ? j.frame_a : j.frame_b;
+      const Vec3 at = m.x[from] + m.q[from] * anchor;
+      const BodyId next = to(at);
+      CHECK_LT(next, m.size());
+      id = next;
+      anchor = m.q[next].conjugate() * (at - m.x[next]);
+      frame = (m.q[next].conjugate() * m.q[from] * frame).normalized();
+    }
+  }
+}
+
+void RigidBodies::record_loads(BodyId id, bool on) {
+  CHECK_LT(id, size());
+  impl_->recorded[id] = on;
+}
+std::span<const ContactLoad> RigidBodies::contact_loads() const { return impl_->loads; }
+bool RigidBodies::is_gone(BodyId id) const { return impl_->role.at(id) == Role::kGone; }
+const Surface& RigidBodies::surface(BodyId id) const { return impl_->surface.at(id); }
+Vec3 RigidBodies::force(BodyId id) const { return impl_->force.at(id); }
+Vec3 RigidBodies::torque(BodyId id) const { return impl_->torque.at(id); }
+
+struct RigidBodies::Moment {
+  Impl::Saved state;
+  std::vector<Vec3> force, torque;
+  std::vector<geometry::RigidPose> target;
+  std::vector<std::uint8_t> driven_now;
+};
+
+std::shared_ptr<const RigidBodies::Moment> RigidBodies::moment() const {
+  const Impl& m = *impl_;
+  return std::make_shared<const Moment>(Moment{m.saved(), m.force, m.torque, m.target, m.driven_now});
+}
+
+void RigidBodies::go_back(const Moment& moment) {
+  Impl& m = *impl_;
+  CHECK_EQ(moment.force.size(), m.size());
+  m.restore(moment.state);
+  m.force = moment.force;
+  m.torque = moment.torque;
+  m.target = moment.target;
+  m.driven_now = moment.driven_now;
+}
+
 // ---- questions -------------------------------------------------------------------------------------------------------
 
 void RigidBodies::wake(BodyId id) {
@@ -321,6 +392,16 @@ void RigidBodies::save(StateWriter& out) const {
   }
   out.array("joint_impulses", impulses);
   out.array("joint_broken", broken);
+  // Ends move on to other bodies when theirs breaks.
+  std::vector<Index> joined;
+  std::vector<Real> frames;
+  for (const JointState& j : m.joints) {
+    joined.insert(joined.end(), {j.joint.a, j.joint.b});
+    for (const Vec3& anchor : {j.anchor_a, j.anchor_b}) frames.insert(frames.end(), {anchor.x(), anchor.y(), anchor.z()});
+    for (const Quat& frame : {j.frame_a, j.frame_b}) frames.insert(frames.end(), {frame.w(), frame.x(), frame.y(), frame.z()});
+  }
+  out.array("joint_bodies", joined);
+  out.array("joint_frames", frames);
 }
 
 void RigidBodies::load(StateReader& in) {
@@ -343,12 +424,17 @@ void RigidBodies::load(StateReader& in) {
     in.array("contact_numbers", numbers);
     in.array("joint_impulses", impulses);
     in.array("joint_broken", broken);
+    std::vector<Index> joined;
+    std::vector<Real> frames;
+    in.array("joint_bodies", joined);
+    in.array("joint_frames", frames);
     const std::size_t count = ends.size() / 2;
     constexpr std::size_t kNumbers = JointState::kHolding + JointState::kExtras + 2;
     if (m.x.size() != n || m.p.size() != n || m.L.size() != n || m.rested.size() != n || m.group.size() != n || q.size() != 4 * n)
       refuse(fmt::format("has {} bodies, here are {}", m.x.size(), n));
     if (ends.size() != 2 * count || vectors.size() != 5 * count || numbers.size() != 3 * count) refuse("has contacts of different lengths");
-    if (broken.size() != m.joints.size() || impulses.size() != kNumbers * m.joints.size())
+    constexpr std::size_t kFrames = 14;
+    if (broken.size() != m.joints.size() || joined.size() != 2 * broken.size() || frames.size() != kFrames * broken.size() || impulses.size() != kNumbers * m.joints.size())
       refuse(fmt::format("has {} joints, here are {}", broken.size(), m.joints.size()));
     for (std::size_t i = 0; i < n; ++i) m.q[i] = Quat(q[4 * i], q[4 * i + 1], q[4 * i + 2], q[4 * i + 3]);
     m.points.assign(count, {});
@@ -372,6 +458,15 @@ void RigidBodies::load(StateReader& in) {
       joint.joint.motor_speed = impulses[kNumbers * (j + 1) - 2];
       joint.joint.motor_strength = impulses[kNumbers * (j + 1) - 1];
       joint.broken = broken[j] != 0;
+      joint.joint.a = joined[2 * j];
+      joint.joint.b = joined[2 * j + 1];
+      for (const BodyId end : {joint.joint.a, joint.joint.b})
+        if (end >= n && end != Joint::kWorld) refuse("has a joint of a body that is not there");
+      const Real* f = frames.data() + kFrames * j;
+      joint.anchor_a = Vec3(f[0], f[1], f[2]);
+      joint.anchor_b = Vec3(f[3], f[4], f[5]);
+      joint.frame_a = Quat(f[6], f[7], f[8], f[9]);
+      joint.frame_b = Quat(f[10], f[11], f[12], f[13]);
     }
   } catch (...) {
     m.restore(before);
@@ -384,7 +479,8 @@ std::size_t RigidBodies::memory() const {
   const Impl& m = *impl_;
   std::size_t bytes = m.points.capacity() * sizeof(ContactPoint) + m.joints.capacity() * sizeof(JointState) + m.solver.capacity() * sizeof(SolverBody);
   bytes += m.size() * (4 * sizeof(Vec3) + 3 * sizeof(Vec3) + sizeof(Quat) + sizeof(PlacedShape) + sizeof(geometry::RigidMotion) + 2 * sizeof(RigidPose));
-  for (const PlacedShape& s : m.placed) bytes += s.hull.vertices.capacity() * sizeof(Vec3) + s.hull.faces.capacity() * sizeof(geometry::ConvexHull::Face);
+  for (const PlacedShape& s : m.placed)
+    for (const geometry::ConvexHull& hull : s.hulls) bytes += hull.vertices.capacity() * sizeof(Vec3) + hull.faces.capacity() * sizeof(geometry::ConvexHull::Face);
   return bytes;
 }
 

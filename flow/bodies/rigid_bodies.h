@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -71,6 +72,14 @@ struct BodyReport {
   Real kinetic = 0, potential = 0;  ///< [J] of dynamic bodies; potential against gravity, 0 at the origin
 };
 
+/// What a contact gave to a body whose loads are recorded (RigidBodies::record_loads), in one substep. In body axes, about its centre of mass.
+struct ContactLoad {
+  BodyId body = 0;
+  int substep = 0;             ///< counted through the whole step
+  Vec3 at = Vec3::Zero();      ///< [m]
+  Vec3 impulse = Vec3::Zero(); ///< [N s]
+};
+
 /// State, as Baraff's lectures have it: position x of the centre of mass, orientation q, linear momentum p, angular
 /// momentum L about the centre, one array each. A step:
 ///
@@ -129,6 +138,23 @@ class RigidBodies {
   Vec3 velocity_at(BodyId id, const Vec3& at) const;
   /// K: velocity_at(id, at) changes by K * impulse for an impulse at the same point [1/kg]. Zero for static and driven ones.
   Mat3 inverse_mass_at(BodyId id, const Vec3& at) const;
+
+  /// Takes a body out for good: nothing meets it, it has no momentum, its number is never given again. Wakes what it touches.
+  void retire(BodyId id);
+  bool is_gone(BodyId id) const;
+  /// Joints of `from` hold the body to(anchor in the world) instead, where they held it: before it is retired.
+  void hand_joints(BodyId from, const std::function<BodyId(const Vec3&)>& to);
+  /// Whether the loads of contacts on this body are kept; by island, place and substep.
+  void record_loads(BodyId id, bool on);
+  std::span<const ContactLoad> contact_loads() const;  ///< of the last step
+  /// What was added since the last step [N], [N m].
+  Vec3 force(BodyId id) const;
+  Vec3 torque(BodyId id) const;
+  const Surface& surface(BodyId id) const;
+  /// All that a step changes, to go back to while no body has come or gone.
+  struct Moment;
+  std::shared_ptr<const Moment> moment() const;
+  void go_back(const Moment& moment);
 
   /// dt [s] > 0. A step whose result is not finite is undone and tried with twice as many looks, six times; then
   /// UnstableError, everything as it was before the step. So is one that pulls a joint apart by 1e-4 of the size of what it holds,

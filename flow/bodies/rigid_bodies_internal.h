@@ -19,7 +19,7 @@
 /// Inside RigidBodies: the state (rigid_bodies.cpp: bodies come, are asked about, saved) and its step (rigid_bodies_step.cpp).
 namespace effuse::flow::bodies {
 
-enum class Role : std::uint8_t { kDynamic, kStatic, kDriven };
+enum class Role : std::uint8_t { kDynamic, kStatic, kDriven, kGone };
 
 /// Thrown inside a step whose numbers went bad: it is tried anew, smaller.
 struct NotFinite {};
@@ -52,6 +52,9 @@ struct RigidBodies::Impl {
   std::vector<geometry::RigidPose> target;
   std::vector<std::uint8_t> driven_now;  // has a target
 
+  std::vector<std::uint8_t> recorded;    // loads are kept
+  std::vector<ContactLoad> loads;        // of the last step
+
   // Work of a look, kept for its memory.
   std::vector<PlacedShape> placed;
   std::vector<std::uint8_t> placed_well;  // bodies that do not move need not be placed again
@@ -79,8 +82,8 @@ struct RigidBodies::Impl {
   void find_contacts();
   bool wake_touched(Real dt);
   PairSurface pair_surface(const ContactPoint& c) const;
-  void solve(Real dt, std::vector<Island>& islands, BodyReport& report);
-  Real solve_island(const Island& island, Real h, int substeps);
+  void solve(Real dt, int number, std::vector<Island>& islands, BodyReport& report);
+  Real solve_island(const Island& island, Real h, int substeps, int first_substep, std::vector<ContactLoad>& loads_out);
   int more_iterations(std::span<const ContactPoint> places) const;
   void go_on(const Island& island, JointSolver& linkage, int k, Real h);
   void stop_fast(const std::vector<Vec3>& before, Real s0, Real s1, BodyReport& report);

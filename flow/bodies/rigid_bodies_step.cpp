@@ -115,6 +115,7 @@ BodyReport RigidBodies::Impl::run(Real dt, int looks) {
   report.dt = dt;
   report.looks = looks;
   report.substeps = looks * substeps_of(dt / looks);
+  loads.clear();
   for (int k = 0; k < looks; ++k) look(dt / looks, k, looks, report);
   time += dt;
   for (Index i = 0; i < size(); ++i) {
@@ -164,7 +165,7 @@ void RigidBodies::Impl::look(Real dt, int number, int looks, BodyReport& report)
   report.contacts = points.size();
 
   const std::vector<Vec3> before = x;
-  solve(dt, islands, report);
+  solve(dt, number, islands, report);
   if (!finite()) throw NotFinite{};
   stop_fast(before, static_cast<Real>(number) / looks, static_cast<Real>(number + 1) / looks, report);
   let_sleep(islands, dt);
@@ -176,7 +177,7 @@ void RigidBodies::Impl::place_bodies(Real dt) {
       size(),
       [&](std::size_t i) {
         const Index k = static_cast<Index>(i);
-        if (placed_well[i] && !awake(k)) return;
+        if (role[i] == Role::kGone || (placed_well[i] && !awake(k))) return;
         placed[i].place(*shape[i], x[i], q[i].toRotationMatrix());
         const Real bound = shape[i]->bounding_radius();
         Real reach = options.margin * bound;
@@ -194,6 +195,13 @@ void RigidBodies::Impl::place_bodies(Real dt) {
   active.resize(size());
   for (Index i = 0; i < size(); ++i) {
     active[i] = awake(i) || driven_now[i];
+    if (role[i] == Role::kGone) {
+      if (i >= broad->size()) {  // numbers have no gaps
+        broad->update(i, Box3(x[i], x[i]));
+        broad->remove(i);
+      }
+      continue;
+    }
     if (placed_well[i] && !awake(i)) continue;
     Box3 box = shape[i]->bounds(x[i], placed[i].R);
     const Vec3 grown = Vec3::Constant(placed[i].margin);
@@ -274,7 +282,7 @@ PairSurface RigidBodies::Impl::pair_surface(const ContactPoint& c) const {
   return {std::sqrt(a.friction * b.friction), std::max(a.restitution, b.restitution), std::max(a.rolling, b.rolling)};
 }
 
-void RigidBodies::Impl::solve(Real dt, std::vector<Island>& islands, BodyReport& report) {
+void RigidBodies::Impl::solve(Real dt, int number, std::vector<Island>& islands, BodyReport& report) {
   ZONE("bodies.solve");
   solver.resize(size() + 1);
   for (Index i = 0; i < size(); ++i) {
@@ -291,7 +299,9 @@ void RigidBodies::Impl::solve(Real dt, std::vector<Island>& islands, BodyReport&
   const int substeps = substeps_of(dt);
   const Real h = dt / substeps;
   std::vector<Real> deepest(islands.size(), 0);
-  parallel_for(islands.size(), [&](std::size_t k) { deepest[k] = solve_island(islands[k], h, substeps); }, 1);
+  std::vector<std::vector<ContactLoad>> given(islands.size());
+  parallel_for(islands.size(), [&](std::size_t k) { deepest[k] = solve_island(islands[k], h, substeps, number * substeps, given[k]); }, 1);
+  for (const auto& part : given) loads.insert(loads.end(), part.begin(), part.end());
   report.penetration = 0;
   for (const Real d : deepest) report.penetration = std::max(report.penetration, d);
   for (const Island& island : islands)
@@ -334,7 +344,7 @@ void RigidBodies::Impl::go_on(const Island& island, JointSolver& linkage, int k,
   for (const Index i : island.bodies) solver[i].refresh();
 }
 
-Real RigidBodies::Impl::solve_island(const Island& island, Real h, int substeps) {
+Real RigidBodies::Impl::solve_island(const Island& island, Real h, int substeps, int first_substep, std::vector<ContactLoad>& loads_out) {
   const bool alone = island.points.empty() && island.joints.empty();
   if (alone) {
     // A ballistic arc is exact with the mean of the velocities.
@@ -360,6 +370,7 @@ Real RigidBodies::Impl::solve_island(const Island& island, Real h, int substeps)
   JointSolver linkage(h, island.joints, joints, solver);
   const int iterations = options.iterations + more_iterations(local);
   const bool soft = options.contact == ContactModel::kPenalty;
+  const bool records = std::any_of(island.bodies.begin(), island.bodies.end(), [&](Index i) { return recorded[i] != 0; });
   contacts.prepare(0);
   linkage.prepare(0);
   // Half of the force before and half after a substep is of second order. What gives (contacts, limits, springs) wants all of it
@@ -392,8 +403,9 @@ Real RigidBodies::Impl::solve_island(const Island& island, Real h, int substeps)
       if (!soft) contacts.solve(false);
       linkage.solve_holding(false);
     }
+    if (!soft && k == substeps) contacts.rebound();
+    if (records) contacts.book(recorded, first_substep + k - 1, loads_out);
   }
-  if (!soft) contacts.rebound();
   const Real deepest = contacts.finish();
   for (std::size_t k = 0; k < local.size(); ++k) points[island.points[k]] = local[k];
   return deepest;

@@ -7,6 +7,7 @@
 
 #include "geometry/base/check.h"
 #include "geometry/procedural/primitives.h"
+#include "geometry/query/closest_point.h"
 
 namespace effuse::flow::bodies {
 namespace {
@@ -45,32 +46,28 @@ std::shared_ptr<const Shape> Shape::sphere(Real radius) {
   return s;
 }
 
-namespace {
-
-/// What is the same for every hull once it stands in body axes.
-struct HullExtras {
-  Real bound, core;
-  std::vector<Vec3> samples;
-  explicit HullExtras(const geometry::ConvexHull& hull) : bound(largest_norm(hull.vertices)), core(bound), samples(hull.vertices) {
-    for (const auto& face : hull.faces) core = std::min(core, face.offset);
-    for (const auto& edge : hull.edges) sample_edge(hull.vertices[edge.vertices[0]], hull.vertices[edge.vertices[1]], bound / 3, samples);
+/// What is the same for every hull once it stands in body axes. The core is left to who has several.
+void Shape::take_hulls(std::vector<geometry::ConvexHull> hulls) {
+  hulls_ = std::move(hulls);
+  for (const geometry::ConvexHull& hull : hulls_) {
+    bound_ = std::max(bound_, largest_norm(hull.vertices));
+    samples_.insert(samples_.end(), hull.vertices.begin(), hull.vertices.end());
   }
-};
-
-}  // namespace
+  corners_ = samples_.size();
+  core_ = bound_;
+  for (const geometry::ConvexHull& hull : hulls_) {
+    for (const auto& face : hull.faces) core_ = std::min(core_, face.offset);
+    for (const auto& edge : hull.edges) sample_edge(hull.vertices[edge.vertices[0]], hull.vertices[edge.vertices[1]], bound_ / 3, samples_);
+  }
+}
 
 std::shared_ptr<const Shape> Shape::box(const Vec3& half) {
   std::shared_ptr<Shape> s(new Shape);
   s->kind_ = Kind::kHull;
-  s->hull_ = geometry::make_box_hull(half);
   s->volume_ = 8 * half.prod();
   const Vec3 squares = half.cwiseAbs2();
   s->moments_ = s->volume_ / 3 * (Vec3::Constant(squares.sum()) - squares);
-  HullExtras extras(s->hull_);
-  s->bound_ = extras.bound;
-  s->core_ = extras.core;
-  s->corners_ = s->hull_.vertices.size();
-  s->samples_ = std::move(extras.samples);
+  s->take_hulls({geometry::make_box_hull(half)});
   return s;
 }
 
@@ -79,22 +76,46 @@ std::shared_ptr<const Shape> Shape::hull(const geometry::TriMesh& mesh) {
   s->kind_ = Kind::kHull;
   const geometry::ConvexHull given = geometry::make_convex_hull(mesh.positions);
   s->take_mass(geometry::mass_properties(geometry::mesh_of(given)));
-  s->hull_ = geometry::transformed(given, s->body_from_given_.orientation.toRotationMatrix(), s->body_from_given_.position);
-  HullExtras extras(s->hull_);
-  s->bound_ = extras.bound;
-  s->core_ = extras.core;
-  s->corners_ = s->hull_.vertices.size();
-  s->samples_ = std::move(extras.samples);
+  s->take_hulls({geometry::transformed(given, s->body_from_given_.orientation.toRotationMatrix(), s->body_from_given_.position)});
   return s;
 }
 
-std::shared_ptr<const Shape> Shape::mesh(const geometry::TriMesh& mesh, Real spacing) {
+std::shared_ptr<const Shape> Shape::parts(std::vector<geometry::ConvexHull> parts, const geometry::MassProperties& mass, geometry::TriMesh surface) {
+  CHECK(!parts.empty());
+  CHECK_GT(mass.volume, 0);
+  std::shared_ptr<Shape> s(new Shape);
+  s->kind_ = parts.size() == 1 ? Kind::kHull : Kind::kParts;
+  s->take_mass(mass);
+  const Mat3 R = s->body_from_given_.orientation.toRotationMatrix();
+  for (geometry::ConvexHull& part : parts) part = geometry::transformed(part, R, s->body_from_given_.position);
+  for (Vec3& p : surface.positions) p = s->body_from_given_.world(p);
+  s->take_hulls(std::move(parts));
+  if (s->kind_ == Kind::kHull) return s;
+  // The centre may lie in no part: then there is no sphere about it.
+  const bool held = std::any_of(s->hulls_.begin(), s->hulls_.end(), [](const geometry::ConvexHull& hull) {
+    return std::all_of(hull.faces.begin(), hull.faces.end(), [](const auto& face) { return face.offset >= 0; });
+  });
+  s->core_ = held ? s->bound_ : 0;
+  for (const geometry::Triangle& t : surface.triangles)
+    s->core_ = std::min(s->core_, geometry::closest_point_on_triangle(Vec3::Zero(), surface.positions[t[0]], surface.positions[t[1]], surface.positions[t[2]]).point.norm());
+  s->outside_ = std::move(surface);
+  return s;
+}
+
+std::shared_ptr<const Shape> Shape::mesh(const geometry::TriMesh& mesh, Real spacing) { return make_mesh(mesh, spacing, nullptr); }
+std::shared_ptr<const Shape> Shape::mesh(const geometry::TriMesh& mesh, const geometry::MassProperties& mass) {
+  CHECK_GT(mass.volume, 0);
+  return make_mesh(mesh, 0, &mass);
+}
+
+std::shared_ptr<const Shape> Shape::make_mesh(const geometry::TriMesh& mesh, Real spacing, const geometry::MassProperties* mass) {
   CHECK(std::isfinite(spacing));
   CHECK_GE(spacing, 0);
   std::shared_ptr<Shape> s(new Shape);
   s->kind_ = Kind::kMesh;
   const geometry::CollisionMesh given(mesh);
-  if (given.solid()) s->take_mass(geometry::mass_properties(given.mesh()));
+  if (mass) s->take_mass(*mass);
+  else if (given.solid()) s->take_mass(geometry::mass_properties(given.mesh()));
   geometry::TriMesh turned;
   turned.triangles = given.mesh().triangles;
   for (const Vec3& p : given.mesh().positions) turned.positions.push_back(s->body_from_given_.world(p));
@@ -117,7 +138,8 @@ std::shared_ptr<const Shape> Shape::mesh(const geometry::TriMesh& mesh, Real spa
 geometry::TriMesh Shape::surface() const {
   switch (kind_) {
     case Kind::kSphere: return geometry::make_sphere(Vec3::Zero(), radius_, 3);
-    case Kind::kHull: return geometry::mesh_of(hull_);
+    case Kind::kHull: return geometry::mesh_of(hulls_[0]);
+    case Kind::kParts: return outside_;
     case Kind::kMesh: break;
   }
   return mesh_->mesh();
@@ -128,7 +150,9 @@ Box3 Shape::bounds(const Vec3& x, const Mat3& R) const {
   switch (kind_) {
     case Kind::kSphere: return Box3(x - Vec3::Constant(radius_), x + Vec3::Constant(radius_));
     case Kind::kHull:
-      for (const Vec3& v : hull_.vertices) box.extend(R * v);
+    case Kind::kParts:
+      for (const geometry::ConvexHull& hull : hulls_)
+        for (const Vec3& v : hull.vertices) box.extend(R * v);
       break;
     case Kind::kMesh: {
       const Box3& own = mesh_->bounds();

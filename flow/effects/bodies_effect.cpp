@@ -26,6 +26,7 @@ class BodiesEffect final : public Effect {
   }
 
   std::vector<geometry::RigidPose> body_poses() const override { return solids_->poses(); }
+  std::vector<SolidPiece> pieces() const override { return solids_->pieces(); }
   std::size_t memory() const override { return solids_->has_bodies() ? solids_->bodies().memory() : 0; }
   void add_to(StateHash& hash) const override {
     hash.add(time_);

@@ -58,6 +58,7 @@ class ModernLavaEffect final : public Effect {
     } catch (const UnstableError& error) {
       throw UnstableError(error.what() + blocked_vents(wanted));
     }
+    solids_->wet(lava_.positions(), lava_.options().spacing);
     Totals& t = totals_;
     t.steps += 1;
     t.retries += last_.retries;
@@ -77,6 +78,7 @@ class ModernLavaEffect final : public Effect {
 
   geometry::Points points() const override { return lava_.points(); }
   std::vector<geometry::RigidPose> body_poses() const override { return solids_->poses(); }
+  std::vector<SolidPiece> pieces() const override { return solids_->pieces(); }
   Real volume() const override { return lava_.volume(); }
   Real spacing() const override { return lava_.options().spacing; }
   std::size_t memory() const override { return lava_.memory(); }

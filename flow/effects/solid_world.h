@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "flow/bodies/brittle_bodies.h"
 #include "flow/bodies/rigid_bodies.h"
 #include "flow/scene/effect.h"
 #include "flow/scene/joints.h"
@@ -24,7 +25,11 @@ bodies::BodyOptions body_options(const BodySettings& settings);
 /// as long, with gravity and their contacts. Momentum is kept, to the tolerance of the viscosity's solve.
 ///
 /// What a body rests on is known to the lava by how it held the body up in the step before (Movable::acceleration).
-/// Surfaces are numbered from 1: obstacles, then bodies, in their order. Not to be moved while a lava refers to it.
+/// Surfaces are numbered from 1: obstacles, then bodies, in their order, then pieces of those that break as they come. Numbers of
+/// bodies that are gone are not given again. Not to be moved while a lava refers to it.
+///
+/// What lava does to a body that may break is spread over the places where particles lie on it (wet()) as one smooth field a + b x r whose
+/// force and moment are those of the solves, so that a wall bends under lava that stands against it.
 class SolidWorld {
  public:
   SolidWorld(const std::vector<PlacedObstacle>& obstacles, const std::vector<PlacedBody>& bodies, const geometry::Terrain* terrain, const bodies::BodyOptions& options = {},
@@ -48,7 +53,11 @@ class SolidWorld {
   bool any() const { return !obstacles_.empty(); }
   bool has_bodies() const { return bodies_ != nullptr; }
   const bodies::RigidBodies& bodies() const { return *bodies_; }
-  /// Poses of the bodies' frames, in their order.
+  /// Where particles lie on bodies that may break, for the next step. Without such bodies: nothing.
+  void wet(std::span<const Vec3> x, Real spacing);
+  /// Bodies that may break, as they are now, in pieces or whole.
+  std::vector<SolidPiece> pieces() const;
+  /// Poses of the bodies' frames, in their order; of one that broke, where it did.
   std::vector<geometry::RigidPose> poses() const;
   Vec3 velocity(std::size_t body) const;
   /// What its steps came to, for a run's report; none without bodies.
@@ -64,13 +73,22 @@ class SolidWorld {
   void tell(std::vector<sph::Movable>& movable) const;
   void take(std::span<const sph::Movable> movable, Real dt);
   void step_bodies(Real dt);
+  void spread(std::size_t body, const Vec3& force, const Vec3& torque);
+  void admit_pieces();
+  void admit(bodies::BodyId id, Index parent);
+  bool gone(std::size_t body) const { return bodies_->is_gone(ids_[body]); }
   template <class Self, class Archive>
   static void archive(Self& self, Archive& io);
 
   std::vector<std::string> names_;       // obstacles', then bodies'
   std::vector<geometry::PoseTrack> tracks_;
   std::vector<bodies::BodyId> driven_;   // of each obstacle; only where there are bodies
-  std::vector<bodies::BodyId> ids_;      // of bodies
+  std::vector<bodies::BodyId> ids_;      // of bodies, then pieces
+  std::size_t of_scene_ = 0;             // bodies of the scene among them
+  std::vector<Index> origin_;            // body of the scene that each is or broke off
+  std::vector<Real> temperature_;
+  std::vector<std::shared_ptr<const geometry::TriMesh>> look_;  // of those that may break
+  std::vector<std::vector<Vec3>> wet_;   // places of lava on them, in their frames
   std::vector<Real> friction_;
   std::vector<Vec3> acceleration_;       // of bodies, by all but lava, in the last step [m/s^2]
   std::vector<geometry::RigidPose> before_;  // body axes at the last step's begin
@@ -78,9 +96,11 @@ class SolidWorld {
   bodies::BodyReport last_;
   struct Totals {
     Real steps = 0, retries = 0, stopped = 0, penetration = 0, joint_error = 0;  // the last two: the largest of any step
+    Real broken = 0, redone = 0;  // bodies that came apart; steps made anew for it
   } totals_;
   geometry::Obstacles obstacles_;
   std::unique_ptr<bodies::RigidBodies> bodies_;
+  std::unique_ptr<bodies::BrittleBodies> brittle_;  // null: none may break
 };
 
 /// Of the obstacles, bodies and joints of a world, with its settings.

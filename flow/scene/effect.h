@@ -37,6 +37,18 @@ struct Estimate {
   double seconds = 0;    ///< of two cores; a rough figure
 };
 
+/// A solid thing that came into the world after its beginning.
+///   id    its number, never given again
+///   body  of the scene's bodies that it broke off, or kNoBody
+///   mesh  closed, its own frame, flat normals; "inner": 1 on faces that breaking has made, 0 on others
+struct SolidPiece {
+  static constexpr Index kNoBody = ~Index{0};
+  Index id = 0, body = kNoBody;
+  std::shared_ptr<const geometry::TriMesh> mesh;
+  geometry::RigidPose pose;
+  Real temperature = 0;  ///< of its surface [K]; 0: that of the air
+};
+
 /// Something that must be stepped, as the run loop sees it: one adapter an effect, over a solver that
 /// knows nothing of scenes. Built only when a scene names it.
 class Effect {
@@ -55,6 +67,8 @@ class Effect {
   virtual Real spacing() const { return 0; }
   /// Where the world's bodies are, in their order, as this effect moves them; empty: it moves none.
   virtual std::vector<geometry::RigidPose> body_poses() const { return {}; }
+  /// What bodies that can break are made of now, a piece each (whole ones, too), and what else has come.
+  virtual std::vector<SolidPiece> pieces() const { return {}; }
   virtual std::size_t memory() const = 0;  ///< bytes held
   virtual void add_to(StateHash& hash) const = 0;
   virtual void save(StateWriter& out) const = 0;

@@ -14,9 +14,10 @@ namespace effuse::flow {
 
 namespace {
 constexpr std::int64_t kMostCopies = 100000;
+constexpr std::size_t kHullVertices = 400;  ///< of one that breaks: contacts are with its cells
 }
 
-std::vector<PlannedBody> read_bodies(Parameters& root) {
+std::vector<PlannedBody> read_bodies(Parameters& root, std::uint64_t seed) {
   std::vector<PlannedBody> plans;
   for (Parameters& p : root.tables("body", "a rigid body that lava pushes, carries and floats, and that pushes back")) {
     PlannedBody plan;
@@ -36,6 +37,7 @@ std::vector<PlannedBody> read_bodies(Parameters& root) {
     plan.rolling = p.number("rolling", "m", plan.rolling, Parameters::not_negative(), "lever arm of its resistance to rolling");
     plan.temperature = p.number("temperature", "K", plan.temperature, {0, 5000}, "of its surface; 0: the ground's");
     plan.lava_friction = p.number("lava_friction", "", plan.lava_friction, {0, 1}, "of lava on it: 1 no slip, 0 free slip");
+    plan.breaking = read_breaking(p, seed);
     const auto copies = p.integer("copies", 1, 1, kMostCopies, "so many of it, called name.1, name.2, ...");
     const Vec3 step = vector("step", "m", "from one copy to the next");
     if (copies == 1) {
@@ -85,12 +87,20 @@ void place_body(const PlannedBody& plan, geometry::TriMesh mesh, const geometry:
   body.spin = plan.spin;
   body.temperature = plan.temperature;
   body.lava_friction = plan.lava_friction;
+  // One that breaks has flat faces.
+  if (plan.breaking.breaks()) body.ball = 0;
   if (!put_on_terrain(body.pose, plan.on_ground, terrain, fmt::format("body '{}'", plan.name), plan.place, faults)) return;
   body.mesh = upright(std::move(mesh), plan.scale, plan.y_up);
   if (too_large(body.mesh, fmt::format("body '{}'", plan.name), plan.file_place, faults)) return;
   try {
-    if (!plan.hull && plan.ball == 0 && !geometry::CollisionMesh(body.mesh).solid()) throw InputError(Place{}, "the mesh is not closed, so that it has no mass: shape = \"hull\" would do");
-    if (plan.ball > 0) body.volume = 4 * kPi / 3 * std::pow(plan.ball, 3);
+    if (!plan.hull && body.ball == 0 && !geometry::CollisionMesh(body.mesh).solid()) throw InputError(Place{}, "the mesh is not closed, so that it has no mass: shape = \"hull\" would do");
+    if (plan.breaking.breaks()) {
+      if (plan.hull || plan.ball > 0) body.mesh = geometry::mesh_of(geometry::make_convex_hull(body.mesh.positions, kHullVertices));
+      body.cells = cut_cells(plan.breaking, body.mesh);
+      body.strength = plan.breaking.strength;
+      body.smallest = plan.breaking.smallest;
+      body.volume = body.cells->volume;
+    } else if (body.ball > 0) body.volume = 4 * kPi / 3 * std::pow(body.ball, 3);
     else body.volume = geometry::mass_properties(plan.hull ? geometry::mesh_of(geometry::make_convex_hull(body.mesh.positions)) : body.mesh).volume;
     if (!(body.volume > 0)) throw InputError(Place{}, "the mesh encloses no volume");
     placed.push_back(std::move(body));

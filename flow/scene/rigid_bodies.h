@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "flow/scene/breaking.h"
 #include "flow/scene/parameters.h"
 #include "flow/scene/placing.h"
 #include "geometry/collide/rigid_pose.h"
@@ -22,10 +23,11 @@ struct PlannedBody : PlannedForm {
   Real rolling = 0;       ///< lever arm of rolling resistance [m]
   Real temperature = 0;   ///< [K]; 0: the ground's
   Real lava_friction = 1; ///< of lava on it: 1 no slip, 0 free slip
+  PlannedBreaking breaking;
 };
 
 /// The tables [[body]] of a scene; one with copies = n stands for n bodies, name.1 to name.n, each a `step` further. Faults stay in root.
-std::vector<PlannedBody> read_bodies(Parameters& root);
+std::vector<PlannedBody> read_bodies(Parameters& root, std::uint64_t seed = 1);
 
 /// A body in the world: metres, z up, from the terrain's origin.
 struct PlacedBody {
@@ -42,6 +44,8 @@ struct PlacedBody {
   Real temperature = 0;
   Real lava_friction = 1;
   Vec3 color = Vec3::Constant(-1);  ///< as PlannedForm has it
+  std::shared_ptr<const geometry::FracturedBody> cells;  ///< of one that may break: of the hull, where that stands for it; null: it does not
+  Real strength = 0, smallest = 0;  ///< [Pa], [m^3]
 };
 
 /// How bodies of a scene are stepped, by its table [bodies].

@@ -49,7 +49,7 @@ Scene read_scene(Parameters& root, std::span<const EffectKind> kinds) {
   scene.ground_temperature = terrain.number("temperature", "K", 288.15, {0, 5000, true}, "of the ground");
 
   scene.obstacles = read_obstacles(root);
-  scene.bodies = read_bodies(root);
+  scene.bodies = read_bodies(root, scene.seed);
   scene.joints = read_joints(root, scene.obstacles, scene.bodies);
   if (root.has("bodies") || !scene.bodies.empty()) {
     Parameters bodies = root.table("bodies", "how rigid bodies are stepped");

@@ -150,7 +150,10 @@ void Solids::rest() {
   all.update();
 }
 
-Real Solids::friction_of(Index surface) const { return surface < options_.friction.size() ? options_.friction[surface] : 1; }
+Real Solids::friction_of(Index surface) const {
+  if (options_.friction_by) return options_.friction_by(surface);
+  return surface < options_.friction.size() ? options_.friction[surface] : 1;
+}
 
 void Solids::find_backing(std::span<const Vec3> x, Real reach, const Walls& ground) {
   ZONE("sph.solids.edges");

@@ -20,6 +20,7 @@ namespace effuse::flow::sph {
 ///   stand      sets motions that end where obstacles are at a moment, at the speed they have in the step of dt [s] that follows, and calls
 ///              update(); empty: what move() says for that step is turned back
 ///   friction   by surface number: factor of the drag along it, 1 no slip, 0 free slip; shorter lists: 1
+///   friction_by  the same by a function, for surfaces that come later; empty: the list says
 ///   movable    the bodies among them that lava moves, as they are now, in any order; called at a step's begin; empty: there are none
 ///   moved      those bodies with the velocities that lava has given them in a step of dt [s], acceleration * dt included. What lava has
 ///              done is the difference less that. Called before move() for the step
@@ -32,6 +33,7 @@ struct SolidOptions {
   std::function<void(std::vector<Movable>&)> movable = {};
   std::function<void(std::span<const Movable>, Real dt)> moved = {};
   std::function<void(Index surface, const Vec3& impulse, const Vec3& at)> push = {};
+  std::function<Real(Index surface)> friction_by = {};
 };
 
 /// The lava's side of its obstacles: walls for the sums, and moves that go through nothing.

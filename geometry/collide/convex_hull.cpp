@@ -52,14 +52,25 @@ void hull_triangles(std::span<const Vec3> points, std::vector<Vec3>& vertices, s
   for (const Vec3& p : points) input.emplace_back(p.x(), p.y(), p.z());
   CGAL::Surface_mesh<Point> mesh;
   CGAL::convex_hull_3(input.begin(), input.end(), mesh);
+  // CGAL's order, and how it cuts flat faces into triangles, may hang on addresses: vertices come by coordinates here, faces (below) by
+  // vertices, so that the same points give the same hull.
   vertices.clear();
   triangles.clear();
-  for (const auto v : mesh.vertices()) vertices.emplace_back(mesh.point(v).x(), mesh.point(v).y(), mesh.point(v).z());
+  std::vector<std::pair<std::array<Real, 3>, std::size_t>> order;
+  for (const auto v : mesh.vertices()) order.push_back({{mesh.point(v).x(), mesh.point(v).y(), mesh.point(v).z()}, static_cast<std::size_t>(v)});
+  std::sort(order.begin(), order.end());
+  std::vector<Index> number(order.size());
+  for (const auto& [p, v] : order) {
+    number[v] = static_cast<Index>(vertices.size());
+    vertices.emplace_back(p[0], p[1], p[2]);
+  }
   for (const auto f : mesh.faces()) {
     std::vector<Index> loop;
-    for (const auto v : mesh.vertices_around_face(mesh.halfedge(f))) loop.push_back(static_cast<Index>(v));
+    for (const auto v : mesh.vertices_around_face(mesh.halfedge(f))) loop.push_back(number[static_cast<std::size_t>(v)]);
+    std::rotate(loop.begin(), std::min_element(loop.begin(), loop.end()), loop.end());
     for (std::size_t k = 1; k + 1 < loop.size(); ++k) triangles.push_back({loop[0], loop[k], loop[k + 1]});
   }
+  std::sort(triangles.begin(), triangles.end());
 }
 
 /// Of the vertices, those extreme along `count` directions spread evenly (a Fibonacci lattice on the sphere).
@@ -124,6 +135,7 @@ std::vector<std::vector<Index>> flat_faces(const std::vector<Vec3>& v, const std
     for (Index at = next.begin()->first; loop.size() < next.size(); at = next.at(at)) loop.push_back(at);
     loops.push_back(std::move(loop));
   }
+  std::sort(loops.begin(), loops.end());
   return loops;
 }
 

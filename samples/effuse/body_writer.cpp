@@ -45,8 +45,16 @@ bool read_pose(std::string_view line, RigidPose& pose) {
 
 BodyWriter::BodyWriter(const LoadedScene& loaded, fs::path folder) : loaded_(loaded), folder_(std::move(folder)) {
   if (!loaded.solids.any_moves()) return;
-  for (const flow::PlacedObstacle& each : loaded.solids.obstacles) names_.push_back(each.name);
-  for (const flow::PlacedBody& each : loaded.solids.bodies) names_.push_back(each.name);
+  const SolidThings& solids = loaded.solids;
+  for (std::size_t i = 0; i < solids.obstacles.size(); ++i) {
+    names_.push_back(solids.obstacles[i].name);
+    things_.push_back(i);
+  }
+  for (std::size_t b = 0; b < solids.bodies.size(); ++b) {
+    if (solids.bodies[b].cells) continue;
+    names_.push_back(solids.bodies[b].name);
+    things_.push_back(solids.obstacles.size() + b);
+  }
   poses_.resize(names_.size());
 }
 
@@ -56,8 +64,11 @@ void BodyWriter::add_frame() {
   std::vector<RigidPose> bodies;
   for (const auto& effect : loaded_.simulation->effects())
     if (bodies.empty()) bodies = effect->body_poses();
-  for (std::size_t i = 0; i < solids.obstacles.size(); ++i) poses_[i].push_back(solids.obstacles[i].track.at(loaded_.simulation->time()));
-  for (std::size_t b = 0; b < solids.bodies.size(); ++b) poses_[solids.obstacles.size() + b].push_back(b < bodies.size() ? bodies[b] : solids.bodies[b].pose);
+  for (std::size_t k = 0; k < things_.size(); ++k) {
+    const std::size_t obstacles = solids.obstacles.size(), b = things_[k] - obstacles;
+    if (things_[k] < obstacles) poses_[k].push_back(solids.obstacles[things_[k]].track.at(loaded_.simulation->time()));
+    else poses_[k].push_back(b < bodies.size() ? bodies[b] : solids.bodies[b].pose);
+  }
 }
 
 void BodyWriter::write_series() const {
@@ -76,7 +87,7 @@ void BodyWriter::write_series() const {
 void BodyWriter::write_animation() const {
   if (!active() || !loaded_.skin.glb || poses_[0].empty()) return;
   std::vector<skin::MovingMesh> things;
-  for (std::size_t k = 0; k < names_.size(); ++k) things.push_back({names_[k], &loaded_.solids.looks[k], poses_[k]});
+  for (std::size_t k = 0; k < names_.size(); ++k) things.push_back({names_[k], &loaded_.solids.looks[things_[k]], poses_[k]});
   std::vector<Real> times;
   for (std::size_t f = 0; f < poses_[0].size(); ++f) times.push_back(static_cast<Real>(f) / loaded_.scene.fps);
   skin::write_animated_glb(folder_ / "bodies.glb", things, times, {{"scene", loaded_.scene.name}, {"units", "metres, seconds"}});

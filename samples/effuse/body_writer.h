@@ -15,7 +15,7 @@ namespace effuse {
 ///                qw, qx, qy, qz; all digits, so that a run resumed reads its own
 ///   bodies.glb   one node a thing, moved by one animation of the film's frames (skin/write/write_animation.h)
 ///
-/// Nothing is done for a scene where nothing moves.
+/// Bodies that may break are left out: they and their pieces are in the frames' meshes. Nothing is done for a scene where nothing moves.
 class BodyWriter {
  public:
   /// Writes nothing. loaded outlives this, its simulation too.
@@ -37,6 +37,7 @@ class BodyWriter {
   const LoadedScene& loaded_;
   std::filesystem::path folder_;
   std::vector<std::string> names_;                          // of obstacles, then bodies
+  std::vector<std::size_t> things_;                         // numbers among the scene's looks
   std::vector<std::vector<geometry::RigidPose>> poses_;     // of each, frame by frame
 };
 

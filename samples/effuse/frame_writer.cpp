@@ -81,7 +81,10 @@ FrameWriter::Result FrameWriter::write_frame(const flow::Simulation& simulation)
   std::vector<geometry::RigidPose> poses;
   for (const auto& effect : simulation.effects())
     if (poses.empty()) poses = effect->body_poses();
-  const geometry::TriMesh solids = solids_.at(simulation.time(), poses);
+  std::vector<flow::SolidPiece> pieces;
+  for (const auto& effect : simulation.effects())
+    for (flow::SolidPiece& piece : effect->pieces()) pieces.push_back(std::move(piece));
+  const geometry::TriMesh solids = solids_.at(simulation.time(), poses, pieces);
   if (settings_.ply && solids_.any_moves()) skin::write_ply(frames / numbered("obstacles", frame, "ply"), solids, about);
   if (preview_) {
     const skin::Image image = preview_->render(in_one_picture(mesh, solids), skin::picture_at(settings_, terrain_, frame / scene_.fps));

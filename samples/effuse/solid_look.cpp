@@ -1,8 +1,10 @@
 #include "samples/effuse/solid_look.h"
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
+#include "geometry/base/random.h"
 #include "skin/color/srgb.h"
 
 namespace effuse {
@@ -25,6 +27,22 @@ Vec3 color_of(LookKind kind, std::size_t number) {
 }
 
 }  // namespace
+
+TriMesh make_piece_look(const TriMesh& mesh, const float* given, Index number) {
+  constexpr Real kPale = 1.25, kSpread = 0.16;
+  constexpr float kBasalt[] = {0.035f, 0.032f, 0.030f};
+  const float* base = given ? given : kBasalt;
+  const Real shade = number == 0 ? 1 : 1 + kSpread * (random_uniform(1, 7, number) - 0.5);
+  TriMesh look;
+  look.positions = mesh.positions;
+  look.triangles = mesh.triangles;
+  look.normals = mesh.normals;
+  geometry::VertexAttribute& color = look.attributes["color"];
+  color.width = 3;
+  for (const float inner : mesh.attributes.at("inner").values)
+    for (int c = 0; c < 3; ++c) color.values.push_back(static_cast<float>(std::min(1.0, base[c] * shade * (inner > 0 ? kPale : 1))));
+  return look;
+}
 
 TriMesh make_look(const TriMesh& mesh, const Vec3& given, LookKind kind, std::size_t number) {
   const Vec3 srgb = given.minCoeff() < 0 ? color_of(kind, number) : given;

@@ -15,4 +15,8 @@ namespace effuse {
 enum class LookKind { kObstacle, kRock, kBox, kBall };
 geometry::TriMesh make_look(const geometry::TriMesh& mesh, const Vec3& color, LookKind kind, std::size_t number);
 
+/// A piece of something broken: its mesh has flat normals and "inner". color: linear, of the body it broke off; null: dark basalt.
+/// Faces that breaking has made are paler than weathered ones, and pieces of different numbers differ a little; number 0: as the body.
+geometry::TriMesh make_piece_look(const geometry::TriMesh& mesh, const float* color, Index number);
+
 }  // namespace effuse

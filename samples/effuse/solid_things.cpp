@@ -53,7 +53,8 @@ std::vector<flow::PlacedBody> load_bodies(const flow::Scene& scene, const std::f
       const std::size_t before = placed.size();
       flow::place_body(plan, mesh_of(plan, folder), terrain, placed, faults);
       if (placed.size() == before) continue;
-      const std::string what = fmt::format("{:.4g} m3, {:.4g} kg", placed.back().volume, placed.back().volume * plan.density);
+      const std::string what = fmt::format("{:.4g} m3, {:.4g} kg{}", placed.back().volume, placed.back().volume * plan.density,
+                                           placed.back().cells ? fmt::format(", {} cells, breaks at {:.4g} Pa", placed.back().cells->cells.size(), placed.back().strength) : "");
       if (before > 0 && same(placed[before - 1], placed.back())) {
         notes.back() = fmt::format("bodies '{}' to '{}': {} each", first, plan.name, what);
       } else {
@@ -103,7 +104,11 @@ bool SolidThings::any_moves() const {
   return !bodies.empty() || std::any_of(obstacles.begin(), obstacles.end(), [](const flow::PlacedObstacle& each) { return each.track.keys().size() > 1; });
 }
 
-geometry::TriMesh SolidThings::at(Real time, const std::vector<geometry::RigidPose>& poses) const {
+bool SolidThings::any_breaks() const {
+  return std::any_of(bodies.begin(), bodies.end(), [](const flow::PlacedBody& each) { return each.cells != nullptr; });
+}
+
+geometry::TriMesh SolidThings::at(Real time, const std::vector<geometry::RigidPose>& poses, const std::vector<flow::SolidPiece>& pieces) const {
   CHECK_EQ(looks.size(), obstacles.size() + bodies.size());
   geometry::TriMesh all;
   geometry::VertexAttribute& color = all.attributes["color"];
@@ -117,7 +122,19 @@ geometry::TriMesh SolidThings::at(Real time, const std::vector<geometry::RigidPo
     color.values.insert(color.values.end(), own.begin(), own.end());
   };
   for (std::size_t i = 0; i < obstacles.size(); ++i) add(looks[i], obstacles[i].track.at(time));
-  for (std::size_t b = 0; b < bodies.size(); ++b) add(looks[obstacles.size() + b], b < poses.size() ? poses[b] : bodies[b].pose);
+  for (std::size_t b = 0; b < bodies.size(); ++b)
+    if (!bodies[b].cells || pieces.empty()) add(looks[obstacles.size() + b], b < poses.size() ? poses[b] : bodies[b].pose);
+  if (!any_breaks() && pieces.empty()) return all;
+  std::vector<float> number(all.positions.size(), 0), inner(all.positions.size(), 0);
+  for (const flow::SolidPiece& piece : pieces) {
+    const float* color_of_body = piece.body == flow::SolidPiece::kNoBody ? nullptr : looks[obstacles.size() + piece.body].attributes.at("color").values.data();
+    add(make_piece_look(*piece.mesh, color_of_body, piece.id < bodies.size() ? 0 : piece.id), piece.pose);
+    const std::vector<float>& own_inner = piece.mesh->attributes.at("inner").values;
+    inner.insert(inner.end(), own_inner.begin(), own_inner.end());
+    number.resize(all.positions.size(), static_cast<float>(piece.id + 1));
+  }
+  all.attributes["piece"] = {1, std::move(number)};
+  all.attributes["inner"] = {1, std::move(inner)};
   return all;
 }
 
@@ -126,6 +143,8 @@ geometry::TriMesh in_one_picture(geometry::TriMesh lava, const geometry::TriMesh
   geometry::TriMesh cold = obstacles;
   const std::size_t n = cold.positions.size();
   if (lava.positions.empty()) return obstacles;
+  // Only what the picture is made of goes on.
+  for (const char* name : {"piece", "inner"}) cold.attributes.erase(name);
   for (const auto& [name, attribute] : lava.attributes) {
     if (name == "color") continue;
     geometry::VertexAttribute& own = cold.attributes[name];

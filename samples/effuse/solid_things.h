@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <vector>
 
+#include "flow/scene/effect.h"
 #include "flow/scene/joints.h"
 #include "flow/scene/obstacles.h"
 #include "flow/scene/rigid_bodies.h"
@@ -40,8 +41,10 @@ struct SolidThings {
   double memory() const { return 1400.0 * static_cast<double>(triangles()); }
   double start_seconds() const { return 8e-6 * static_cast<double>(triangles()); }
   double frame_seconds() const { return 2e-6 * static_cast<double>(triangles()); }
-  /// All where they are at a time [s], as one mesh of their looks. poses: of the bodies; empty: where the scene puts them.
-  geometry::TriMesh at(Real time, const std::vector<geometry::RigidPose>& poses = {}) const;
+  bool any_breaks() const;
+  /// All where they are at a time [s], as one mesh of their looks. poses: of the bodies; empty: where the scene puts them. pieces: instead of
+  /// the bodies that can break. Where there are such: "piece", 0 for the others, and "inner", 1 on faces that breaking has made.
+  geometry::TriMesh at(Real time, const std::vector<geometry::RigidPose>& poses = {}, const std::vector<flow::SolidPiece>& pieces = {}) const;
 };
 
 /// Lava and obstacles for one picture: these cold and dull.

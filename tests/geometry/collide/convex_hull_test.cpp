@@ -57,6 +57,20 @@ TEST(ConvexHull, OfABoxHasSixFacesHoweverItIsTurned) {
   check_hull(make_box_hull(Vec3(1, 2, 3)));
 }
 
+// Memory moves between calls; what is answered must not.
+TEST(ConvexHull, TheSamePointsGiveTheSameBits) {
+  std::vector<Vec3> points = make_sphere(Vec3(1, 2, 3), 1, 2).positions;
+  for (const Vec3& p : make_box(Vec3(0, 1, 2), Vec3(2.5, 3, 4)).positions) points.push_back(p);
+  const ConvexHull first = make_convex_hull(points);
+  std::vector<std::vector<char>> clutter;
+  for (std::size_t k = 0; k < 20; ++k) {
+    clutter.emplace_back(100 * k + 7);
+    const ConvexHull again = make_convex_hull(points);
+    EXPECT_TRUE(first.vertices == again.vertices);
+    EXPECT_TRUE(first.loops == again.loops);
+  }
+}
+
 TEST(ConvexHull, HoldsAllItsPoints) {
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     std::vector<Vec3> points;
