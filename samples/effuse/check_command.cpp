@@ -38,7 +38,7 @@ double disk_per_frame(double particles, const skin::SkinSettings& s) {
 /// Bytes beyond the effects': the program with its libraries, the terrain, and the skin of the last frame as it is made, written and
 /// drawn. Measured on Maunga Whau at edges of 0.5, 0.25 and 0.15 with one format, all, and pictures: within a quarter, voronoi too.
 double memory_of_skin(double particles, std::size_t posts, const skin::SkinSettings& s) {
-  double bytes = 52e6 + static_cast<double>(posts) * (s.preview ? 460 : 225);
+  double bytes = 79e6 + static_cast<double>(posts) * (s.preview ? 460 : 225);
   if (!s.ply && !s.obj && !s.glb && !s.vdb && !s.preview) return bytes;
   bytes += particles * (3500 * std::pow(0.5 / s.voxel, 2) + (s.detail.kind == skin::SkinKind::kNoise ? 0 : 5000));
   bytes += triangles(particles, s) * (155 + 40 * s.obj + 60 * s.glb + 40 * s.preview);

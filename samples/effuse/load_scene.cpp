@@ -13,6 +13,7 @@
 #include "samples/effuse/flow_writer.h"
 #include "samples/effuse/misspelt.h"
 #include "samples/effuse/solid_things.h"
+#include "samples/effuse/terrain_options.h"
 
 namespace effuse {
 
@@ -58,23 +59,21 @@ std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const
   }
 
   const flow::Scene& scene = loaded->scene;
-  std::filesystem::path terrain_path;
-  if (!scene.terrain_file.empty()) {
+  std::vector<std::filesystem::path> terrain_paths;
+  if (!scene.terrain.files.empty()) {
     try {
-      std::filesystem::path path = scene.terrain_file;
-      if (path.is_relative()) path = file.parent_path() / path;
-      terrain_path = std::filesystem::absolute(path).lexically_normal();
-      importers::TerrainImport import = importers::import_terrain(path, {scene.ground_temperature, scene.terrain_crs});
+      for (const std::string& name : scene.terrain.files) terrain_paths.push_back(std::filesystem::path(name).is_relative() ? file.parent_path() / name : std::filesystem::path(name));
+      importers::TerrainImport import = importers::import_terrain(terrain_paths, terrain_options(scene.terrain));
       loaded->terrain = std::move(import.terrain);
       loaded->notes = std::move(import.notes);
     } catch (const InputError& error) {
       // Told at the scene's line that names the file; the file's own line and column stay in the words.
-      for (const Fault& fault : error.faults()) faults.push_back({scene.terrain_place, to_string(fault)});
+      for (const Fault& fault : error.faults()) faults.push_back({scene.terrain.place, to_string(fault)});
     }
   }
-  if (scene.plane && scene.plane->size.minCoeff() > 0) {
-    loaded->terrain = geometry::Terrain::from_height_field(geometry::make_plane(scene.plane->size, scene.plane->slope, scene.plane->downhill), {}, scene.ground_temperature);
-    loaded->notes.push_back(fmt::format("plane of {:g} x {:g} m, slope {:.3g} deg", scene.plane->size.x(), scene.plane->size.y(), scene.plane->slope * 180 / kPi));
+  if (const auto& plane = scene.terrain.plane; plane && plane->size.minCoeff() > 0) {
+    loaded->terrain = geometry::Terrain::from_height_field(geometry::make_plane(plane->size, plane->slope, plane->downhill), {}, scene.terrain.temperature);
+    loaded->notes.push_back(fmt::format("plane of {:g} x {:g} m, slope {:.3g} deg", plane->size.x(), plane->size.y(), plane->slope * 180 / kPi));
   }
   if (loaded->terrain) {
     loaded->solids.obstacles = load_obstacles(scene, file.parent_path(), *loaded->terrain, faults, loaded->notes);
@@ -102,7 +101,12 @@ std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const
       return node_of;
     };
     for (auto& [name, table] : resolved.entries) {
-      if (name == "terrain" && !scene.plane) table.set("file", whole(terrain_path));
+      if (name == "terrain" && !scene.terrain.plane) {
+        flow::Node files;
+        files.kind = flow::Node::Kind::kArray;
+        for (const std::filesystem::path& path : terrain_paths) files.items.push_back(whole(std::filesystem::absolute(path).lexically_normal()));
+        table.set("file", files.items.size() == 1 ? files.items.front() : files);
+      }
       if (name != "obstacle" && name != "body") continue;
       for (flow::Node& one : table.items)
         if (const flow::Node* path = one.find("file"); path && !path->text.empty()) one.set("file", whole(std::filesystem::absolute(file.parent_path() / path->text).lexically_normal()));

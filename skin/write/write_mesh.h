@@ -11,7 +11,7 @@
 /// Meshes for Blender, Houdini, ParaView and web viewers. Our own writers, because the libraries' drop the attributes
 /// (temperature, velocity, crust) that a shader needs, or write files that are wrong.
 ///
-/// All three: the file is whole or absent (geometry/base/files.h); a mesh without triangles, or without vertices, is a
+/// All of them: the file is whole or absent (geometry/base/files.h); a mesh without triangles, or without vertices, is a
 /// valid file too, so that a sequence has no gap before the lava comes; normals are always there (computed when the
 /// mesh has none: readers shade flat without). A mesh that cannot be written (index out of range, a number that is not
 /// finite, an attribute of the wrong length) is an InputError naming file and fault, a full disk a ResourceError.
@@ -48,5 +48,9 @@ void write_obj(const std::filesystem::path& file, const geometry::TriMesh& mesh,
 /// COLOR_0 stays the display colour: a reader that ignores emission still shows hot lava hot.
 /// A mesh without triangles writes a valid file without meshes.
 void write_glb(const std::filesystem::path& file, const geometry::TriMesh& mesh, const Metadata& metadata = {});
+
+/// Binary STL: positions as float and the triangles' own normals; no attributes. Its header of 80 bytes holds the metadata's
+/// "origin" and as much of its "crs" as fits; it never begins with "solid".
+void write_stl(const std::filesystem::path& file, const geometry::TriMesh& mesh, const Metadata& metadata = {});
 
 }  // namespace effuse::skin

@@ -674,7 +674,9 @@ TEST_F(ProgramTest, GoesOnWithoutAnybodyWhoListens) {
 
 TEST_F(ProgramTest, TakesNamesThatAreNotUtf8) {
   fs::copy_file(kScenes / "gully.asc", folder_ / "gully.asc");
-  write("gully.prj", "PROJCS[\"R\xe9union\",GEOGCS[\"x\"],UNIT[\"metre\",1]]");
+  write("gully.prj",
+        "PROJCS[\"R\xe9union\",GEOGCS[\"x\",DATUM[\"y\",SPHEROID[\"z\",6378137,298.257223563]],PRIMEM[\"Greenwich\",0],UNIT[\"Degree\",0.0174532925199433]],PROJECTION[\"Transverse_Mercator\"],"
+        "PARAMETER[\"False_Easting\",160000],PARAMETER[\"False_Northing\",50000],PARAMETER[\"Central_Meridian\",55.5],PARAMETER[\"Scale_Factor\",1],PARAMETER[\"Latitude_Of_Origin\",-21],UNIT[\"Meter\",1]]");
   const fs::path scene = write("sc\xe8ne.toml", "name = \"\xf0\x9f\x8c\x8b \\n \\u0000\"\n" + read_file(kScenes / "lava.toml").substr(read_file(kScenes / "lava.toml").find("\n[film]")));
   const fs::path out = folder_ / "\xe9t\xe9";
   const Outcome outcome = effuse({"run", scene, "-o", out, "--frames", "2", "--set", "lava.spacing=1.2 m", "--set", "preview.pictures=false", "--json"});
