@@ -83,7 +83,7 @@ ExitCode check(const CheckCommand& command, const CommonOptions& common) {
   const double frame_s = 80e-6 * sum.mean_particles + (loaded->skin.preview ? 7e-7 * loaded->skin.picture.width * loaded->skin.picture.height : 0);
   const SolidThings& solids = loaded->solids;
   const bool drawn = loaded->skin.preview || (loaded->skin.ply && solids.any_moves());
-  const double seconds = sum.seconds + scene.frames * (frame_s + (drawn ? solids.frame_seconds() : 0));
+  const double seconds = sum.seconds + solids.start_seconds() + scene.frames * (frame_s + (drawn ? solids.frame_seconds() : 0));
   const double disk = scene.frames * (disk_per_frame(sum.mean_particles, loaded->skin) + (loaded->skin.ply && solids.any_moves() ? 94.0 * static_cast<double>(solids.triangles()) : 0));
   const double memory = sum.bytes + solids.memory() + memory_of_skin(sum.particles, loaded->terrain->mesh().positions.size(), loaded->skin);
 

@@ -39,8 +39,10 @@ struct SolidThings {
   bool any_moves() const;
   /// Triangles of all.
   std::size_t triangles() const;
-  /// Bytes and seconds that they cost beside the simulation: trees to collide with, looks, a picture or file of a frame.
+  /// What they cost beside the simulation: bytes of trees to collide with, looks and the picture's tree; seconds to read, build and write
+  /// them once, and to draw or write them in a frame. Measured on a torus of a million triangles: 1.4 GB, 7.5 s, 2 s a frame.
   double memory() const { return 1400.0 * static_cast<double>(triangles()); }
+  double start_seconds() const { return 8e-6 * static_cast<double>(triangles()); }
   double frame_seconds() const { return 2e-6 * static_cast<double>(triangles()); }
   bool any_breaks() const;
   /// All where they are at a time [s], as one mesh of their looks. poses: of the bodies; empty: where the scene puts them. pieces: instead of
