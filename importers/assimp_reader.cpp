@@ -96,6 +96,10 @@ const aiScene& AssimpReader::read(const std::filesystem::path& file, const std::
   return scene_or_error(file.string(), impl_->importer, [&] { return impl_->importer.ReadFile(file.string(), flags); });
 }
 
+const aiScene& AssimpReader::read_in_place(const std::filesystem::path& file, unsigned flags) {
+  return scene_or_error(file.string(), impl_->importer, [&] { return impl_->importer.ReadFile(file.string(), flags); });
+}
+
 const aiScene& AssimpReader::process(const std::string& name, unsigned flags) {
   return scene_or_error(name, impl_->importer, [&] { return impl_->importer.ApplyPostProcessing(flags); });
 }

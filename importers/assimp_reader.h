@@ -34,6 +34,8 @@ class AssimpReader {
   /// The scene of bytes, known to importers by the path file; lives as long as the reader, whose bytes must
   /// outlive this call. flags: aiPostProcessSteps. Throws InputError with assimp's words.
   const aiScene& read(const std::filesystem::path& file, const std::string& bytes, unsigned flags);
+  /// The same of a file that its importer opens itself, where it lies: nothing is held in memory.
+  const aiScene& read_in_place(const std::filesystem::path& file, unsigned flags);
   /// More post processing of the scene that was read.
   const aiScene& process(const std::string& name, unsigned flags);
 

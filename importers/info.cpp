@@ -13,9 +13,9 @@
 #include "importers/mesh/import_mesh.h"
 #include "importers/scene/scene_file.h"
 #include "importers/terrain/depressions.h"
-#include "importers/terrain/esri_ascii.h"
+#include "importers/terrain/import_dem.h"
 #include "importers/terrain/import_terrain.h"
-#include "importers/terrain/projection.h"
+#include "importers/terrain/spatial_reference.h"
 
 namespace effuse::importers {
 
@@ -49,7 +49,7 @@ Lines describe_grid(const fs::path& file) {
   lines.push_back(holes == 0 ? std::string("holes: none")
                              : fmt::format("holes: {} posts without data ({:.1f} %)", holes,
                                            100.0 * static_cast<double>(holes) / static_cast<double>(field.posts().size())));
-  lines.push_back("coordinate system: " + (georeference.crs.empty() ? std::string("unknown") : projection_title(georeference.crs)));
+  lines.push_back("coordinate system: " + to_string(read_crs(georeference.crs, file.string())));
   lines.push_back(
       fmt::format("local origin: {:.0f}, {:.0f}, {:.0f}", georeference.origin.x(), georeference.origin.y(), georeference.origin.z()));
 
@@ -126,8 +126,7 @@ Lines describe_scene(const fs::path& file) {
 std::vector<std::string> describe_file(const fs::path& file) {
   const std::string extension = lower_extension(file);
   if (extension == ".toml") return describe_scene(file);
-  const bool grid = extension == ".asc" || looks_like_esri_ascii(read_input(file, std::uint64_t{8} << 30, "a file"));
-  return grid ? describe_grid(file) : describe_mesh(file);
+  return is_dem(file) ? describe_grid(file) : describe_mesh(file);
 }
 
 }  // namespace effuse::importers

@@ -15,6 +15,11 @@ namespace effuse::importers {
 namespace fs = std::filesystem;
 
 std::string read_input(const fs::path& file, std::uint64_t limit, std::string_view what) {
+  check_input(file, limit, what);
+  return read_file(file);
+}
+
+void check_input(const fs::path& file, std::uint64_t limit, std::string_view what) {
   const Place place{file.string()};
   std::error_code error;
   const fs::file_status status = fs::status(file, error);
@@ -27,7 +32,6 @@ std::string read_input(const fs::path& file, std::uint64_t limit, std::string_vi
   if (error) throw InputError(place, "cannot read: " + error.message());
   if (size == 0) throw InputError(place, "the file is empty");
   if (size > limit) throw InputError(place, fmt::format("is too large for {}: {} bytes, at most {}", what, size, limit));
-  return read_file(file);
 }
 
 std::string printable(std::string_view text, std::size_t limit) {

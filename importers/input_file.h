@@ -12,6 +12,9 @@ namespace effuse::importers {
 /// readable, empty, or larger than limit bytes (what: "a scene", for that message).
 std::string read_input(const std::filesystem::path& file, std::uint64_t limit, std::string_view what);
 
+/// The same questions without reading: for files that a package opens itself. Throws as read_input does.
+void check_input(const std::filesystem::path& file, std::uint64_t limit, std::string_view what);
+
 /// "'12,5'": a piece of a file in quotes, cut to 40 characters, what cannot be printed as '?'.
 std::string quote(std::string_view text);
 

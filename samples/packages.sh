@@ -6,7 +6,7 @@ set -eu
 
 build_packages="
   g++ cmake ninja-build ccache git
-  libcgal-dev libeigen3-dev libassimp-dev libopenvdb-dev libboost-iostreams-dev libtbb-dev libfcl-dev libembree-dev
+  libcgal-dev libeigen3-dev libassimp-dev libgdal-dev libopenvdb-dev libboost-iostreams-dev libtbb-dev libfcl-dev libembree-dev
   libcli11-dev libtomlplusplus-dev libfmt-dev nlohmann-json3-dev libpng-dev zlib1g-dev libcairo2-dev"
 test_packages="
   libgtest-dev libgmock-dev libbenchmark-dev libbullet-dev assimp-utils libopenvdb-tools ca-certificates"

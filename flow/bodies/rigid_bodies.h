@@ -61,7 +61,8 @@ struct Surface {
 
 struct BodyReport {
   Real dt = 0;                ///< [s]
-  int looks = 0, substeps = 0, retries = 0;
+  int looks = 0, substeps = 0;
+  int retries = 0;            ///< times that the step was undone and tried with twice as many looks
   std::size_t contacts = 0;   ///< places, at the last look
   std::size_t awake = 0;      ///< dynamic bodies
   std::size_t islands = 0;    ///< of awake bodies
@@ -156,7 +157,8 @@ class RigidBodies {
   void go_back(const Moment& moment);
 
   /// dt [s] > 0. A step whose result is not finite is undone and tried with twice as many looks, six times; then
-  /// UnstableError, everything as it was before the step.
+  /// UnstableError, everything as it was before the step. So is one that pulls a joint apart by 1e-4 of the size of what it holds,
+  /// four times; what comes then is kept.
   BodyReport step(Real dt);
 
   std::size_t size() const;

@@ -91,6 +91,7 @@ struct RigidBodies::Impl {
   int looks_for(Real dt) const;
   bool may_meet(Index i, Real reach) const;
   bool finite() const;
+  Real joint_strain() const;
 
   /// What a step changes: to be taken back when it went wrong.
   struct Saved {

@@ -18,6 +18,8 @@ namespace {
 
 constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
 constexpr int kRetries = 6;
+constexpr int kJointRetries = 4;
+constexpr Real kJointGood = 1e-4;   ///< of the smaller bounding radius, or of a radian: joints that are off by less are well
 constexpr Real kSamePlace = 0.02;   ///< of the smaller bounding radius: a place found again
 constexpr Real kFarthest = 1e12;    ///< [m]: a body further off has gone bad
 constexpr Real kTravel = 0.5;       ///< of the bounding radius, between two looks
@@ -59,6 +61,19 @@ bool RigidBodies::Impl::finite() const {
   return true;
 }
 
+/// How far the worst joint is off, in units of what is well.
+Real RigidBodies::Impl::joint_strain() const {
+  Real worst = 0;
+  for (const JointState& j : joints) {
+    if (j.broken) continue;
+    Real size = 1;
+    for (const BodyId end : {j.joint.a, j.joint.b})
+      if (end != Joint::kWorld && dynamic(end)) size = std::min(size, shape[end]->bounding_radius());
+    worst = std::max(worst, bodies::joint_error(j, solver_body(j.joint.a), solver_body(j.joint.b)) / (kJointGood * size));
+  }
+  return worst;
+}
+
 BodyReport RigidBodies::step(Real dt) {
   ZONE("bodies.step");
   CHECK(dt > 0 && std::isfinite(dt));
@@ -66,10 +81,16 @@ BodyReport RigidBodies::step(Real dt) {
   const Impl::Saved before = m.saved();
   for (Index i = 0; i < m.size(); ++i) m.motion[i] = m.driven_now[i] ? RigidMotion({m.x[i], m.q[i]}, m.target[i], dt) : RigidMotion({m.x[i], m.q[i]});
   const int looks = m.finite() ? m.looks_for(dt) : 1;
+  const Real strain = m.joint_strain();
   for (int retry = 0; retry <= kRetries; ++retry) {
     try {
       BodyReport report = m.run(dt, looks << retry);
       report.retries = retry;
+      // A jerk that the substeps were too long for: heavy things on light chains. What was off before, and stays so, is left to heal.
+      if (retry < kJointRetries && m.joint_strain() > std::max(Real{1}, 2 * strain)) {
+        m.restore(before);
+        continue;
+      }
       for (Index i = 0; i < m.size(); ++i) {
         m.force[i].setZero();
         m.torque[i].setZero();

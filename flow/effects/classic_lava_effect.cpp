@@ -131,7 +131,8 @@ LavaModel read_classic_lava(Parameters& p) {
   o.air_exchange = p.number("air_exchange", "W/(m2 K)", o.air_exchange, not_negative, "heat transfer to the air");
   o.air_temperature = p.number("air_temperature", "K", o.air_temperature, temperature, "");
   o.ground_exchange = p.number("ground_exchange", "W/(m2 K)", o.ground_exchange, not_negative, "heat transfer to the ground");
-  o.scheme = static_cast<Scheme>(p.choice("scheme", names(kSchemeNames), 1, "time integration"));
+  const std::vector<std::string> explicit_schemes(kSchemeNames, kSchemeNames + kExplicitSchemes);
+  o.scheme = static_cast<Scheme>(p.choice("scheme", explicit_schemes, 1, "time integration"));
   o.courant = p.number("courant", "", o.courant, {0, 2, true}, "of the step: share of the time sound takes over half the support");
   o.max_step = p.number("max_step", "s", o.max_step, positive, "no step is longer");
   o.surface.mass_quotient = p.number("surface_mass_quotient", "", o.surface.mass_quotient, {0, 1},

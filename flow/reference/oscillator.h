@@ -28,6 +28,10 @@ struct Oscillator {
     velocity_rates(t, y, k);
     position_rates(t, y, k);
   }
+  void implicit_euler(Real, Real dt, OscillatorState& y) const {
+    y.v = (y.v - dt * omega * omega * y.x) / (1 + omega * omega * dt * dt);
+    y.x += dt * y.v;
+  }
 };
 
 }  // namespace effuse::flow

@@ -306,6 +306,25 @@ std::vector<std::string> Parameters::texts(const std::string& key, std::size_t c
   return value;
 }
 
+std::vector<std::string> Parameters::texts(const std::string& key, std::string_view what) {
+  Table::Entry& entry = table_->entry(key);
+  shared_->document(joined(table_->doc_path, key), "text, or several: [\"a\", \"b\"]", "", what);
+  const Node* node = table_->node ? table_->node->find(key) : nullptr;
+  if (!node) {
+    fault(key, fmt::format("is missing ({}), wanted text in quotes", what));
+    return {};
+  }
+  const std::vector<Node> items = node->kind == Node::Kind::kArray ? node->items : std::vector<Node>{*node};
+  if (items.empty()) fault(key, "found an empty array, wanted at least one text in quotes");
+  std::vector<std::string> values;
+  for (const Node& item : items) {
+    if (item.kind == Node::Kind::kText && !item.text.empty()) values.push_back(item.text);
+    else shared_->faults.push_back({item.place, joined(path_, key) + ": " + fmt::format("found {}, wanted text in quotes", shown(item))});
+  }
+  entry.value = *node;
+  return values.size() == items.size() ? values : std::vector<std::string>();
+}
+
 std::size_t Parameters::choice(const std::string& key, const std::vector<std::string>& names, std::size_t fallback, std::string_view what) {
   CHECK_LT(fallback, names.size());
   Table::Entry& entry = table_->entry(key);

@@ -45,6 +45,8 @@ class Parameters {
   std::string text(const std::string& key, std::optional<std::string> fallback, std::string_view what);
   /// ["a", "b", ...], so many, required; empty after a fault.
   std::vector<std::string> texts(const std::string& key, std::size_t count, std::string_view what);
+  /// One text, or an array of them; required, and none is empty.
+  std::vector<std::string> texts(const std::string& key, std::string_view what);
   /// Index into names of the one given.
   std::size_t choice(const std::string& key, const std::vector<std::string>& names, std::size_t fallback, std::string_view what);
   /// Several of names: indices, in the order given; fallback when the key is absent.

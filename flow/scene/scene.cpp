@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace effuse::flow {
@@ -28,25 +29,7 @@ Scene read_scene(Parameters& root, std::span<const EffectKind> kinds) {
   scene.fps = film.number("fps", "1/s", 24, Parameters::positive(), "frames a second of film");
   scene.time_scale = film.number("time_scale", "", 1, Parameters::positive(), "simulated seconds a second of film: 30 is a time lapse");
 
-  Parameters terrain = root.table("terrain", "the ground");
-  Parameters plane = terrain.table("plane", "flat ground about the origin, instead of a file");
-  if (terrain.has("plane")) {
-    const std::vector<Real> size = plane.numbers("size", "m", 2, true, "along x and y");
-    scene.plane.emplace();
-    scene.plane->size = Vec2(size[0], size[1]);
-    if (plane.has("size") && !(scene.plane->size.minCoeff() >= 1e-2 && scene.plane->size.maxCoeff() <= 1e6)) plane.fault("size", "must be from 0.01 to 1e6 m");
-    scene.plane->slope = plane.number("slope", "rad", 0, {0, 1.5}, "of the ground");
-    scene.plane->downhill = plane.number("downhill", "rad", 0, {}, "the way it falls, counter-clockwise from east");
-    if (terrain.has("file")) {
-      terrain.text("file", "", "");
-      terrain.fault("file", "found with plane, wanted one or the other");
-    }
-  }
-  if (!scene.plane) scene.terrain_file = terrain.text("file", std::nullopt, "DEM grid or mesh, relative to the scene file; or [terrain.plane]");
-  scene.terrain_place = terrain.place("file");
-  if (terrain.has("file") && (scene.terrain_file.empty() || scene.terrain_file.find('\0') != std::string::npos)) terrain.fault("file", "is not the name of a file");
-  scene.terrain_crs = terrain.text("crs", "", "coordinate system, when the file says none or a wrong one");
-  scene.ground_temperature = terrain.number("temperature", "K", 288.15, {0, 5000, true}, "of the ground");
+  scene.terrain = read_terrain_settings(root);
 
   scene.obstacles = read_obstacles(root);
   scene.bodies = read_bodies(root, scene.seed);
@@ -59,8 +42,17 @@ Scene read_scene(Parameters& root, std::span<const EffectKind> kinds) {
 
   for (const EffectKind& kind : kinds) {
     if (kind.of_solids || !root.has(kind.name)) continue;
-    Parameters table = root.table(kind.name, kind.what);
-    scene.effects.push_back(kind.read(table, scene.frame_time(scene.frames)));
+    if (!kind.many) {
+      Parameters table = root.table(kind.name, kind.what);
+      scene.effects.push_back(kind.read(table, scene.frame_time(scene.frames)));
+      continue;
+    }
+    for (Parameters& table : root.tables(kind.name, kind.what)) {
+      EffectPlan plan = kind.read(table, scene.frame_time(scene.frames));
+      if (std::any_of(scene.effects.begin(), scene.effects.end(), [&](const EffectPlan& other) { return other.name == plan.name; }))
+        table.fault("name", fmt::format("'{}' is the name of another effect, wanted one of its own: files are called by it", plan.name));
+      scene.effects.push_back(std::move(plan));
+    }
   }
   if (scene.effects.empty() && !(scene.obstacles.empty() && scene.bodies.empty())) {
     const Node nothing;

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -9,14 +8,9 @@
 #include "flow/scene/effect.h"
 #include "flow/scene/joints.h"
 #include "flow/scene/parameters.h"
+#include "flow/scene/terrain_settings.h"
 
 namespace effuse::flow {
-
-/// Flat ground, the table [terrain.plane]: geometry::make_plane.
-struct PlannedPlane {
-  Vec2 size = Vec2::Zero();  ///< [m]
-  Real slope = 0, downhill = 0;  ///< [rad]
-};
 
 /// What a scene says, but for the tables that the skin and the writers read. A value.
 struct Scene {
@@ -25,11 +19,7 @@ struct Scene {
   int frames = 0;
   Real fps = 24;
   Real time_scale = 1;          ///< simulated seconds a second of film
-  std::string terrain_file;     ///< as written; relative to the scene file. "": plane
-  std::optional<PlannedPlane> plane;
-  Place terrain_place;
-  std::string terrain_crs;      ///< "": as the file says
-  Real ground_temperature = 0;  ///< [K]
+  TerrainSettings terrain;
   std::vector<PlannedObstacle> obstacles;
   std::vector<PlannedBody> bodies;
   std::vector<PlannedJoint> joints;

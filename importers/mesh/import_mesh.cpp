@@ -288,7 +288,7 @@ MeshImport import_mesh(const fs::path& file) {
   if (extension.empty() || !reader.reads(extension))
     throw InputError({name},
                      fmt::format("there is no reader for files ending in '{}'; meshes: .obj .ply .stl .off .glb .gltf .dae and more, "
-                                 "terrain grids: .asc",
+                                 "terrain grids: .tif .asc .hgt .dem .flt .xyz .nc and more",
                                  printable(extension, 20)));
 
   // Read; positions are looked at before anything computes with them.

@@ -17,7 +17,7 @@ struct DemGrid {
   std::vector<Real> z;             ///< nx * ny heights [m], i fastest, south row first; NaN: a hole
   std::size_t nodata = 0;          ///< how many are holes
   std::string crs;                 ///< WKT or an authority's code; empty: unknown
-  std::vector<std::string> notes;  ///< for people: what was assumed
+  std::vector<std::string> notes;  ///< for people: what was found, assumed and changed
 };
 
 }  // namespace effuse::importers

@@ -9,12 +9,19 @@
 #include <assimp/IOSystem.hpp>
 #include <assimp/Importer.hpp>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "geometry/base/check.h"
 #include "geometry/base/error.h"
+#include "importers/assimp_reader.h"
+#include "importers/input_file.h"
 #include "importers/terrain/esri_ascii.h"
+#include "importers/terrain/gdal_raster.h"
+#include "importers/terrain/import_dem.h"
+#include "importers/terrain/xyz_grid.h"
 
 namespace effuse::importers {
 
@@ -79,34 +86,38 @@ std::unique_ptr<aiMesh> make_mesh(const DemGrid& grid, int stride) {
   return mesh;
 }
 
-class AscImporter final : public Assimp::BaseImporter {
+class DemImporter final : public Assimp::BaseImporter {
  public:
-  explicit AscImporter(std::shared_ptr<DemResult> result) : result_(std::move(result)) {}
+  explicit DemImporter(std::shared_ptr<DemResult> result, DemRequest request) : result_(std::move(result)), request_(std::move(request)) {
+    extensions_ = std::string("asc xyz ") + gdal_extensions();
+    description_ = {"effuse importer of elevation grids", "effuse", "", "", aiImporterFlags_SupportTextFlavour | aiImporterFlags_SupportBinaryFlavour, 0, 0, 0, 0, extensions_.c_str()};
+  }
 
   bool CanRead(const std::string& file, Assimp::IOSystem* files, bool check_signature) const override {
-    if (SimpleExtensionCheck(file, "asc")) return true;
+    const std::string extension = lower_extension(file);
+    if (extension == ".asc" || extension == ".xyz" || gdal_reads(extension)) return true;
     if (!check_signature || !files) return false;
     try {
-      return looks_like_esri_ascii(read_stream(*files, file, 512));
+      const std::string start = read_stream(*files, file, 512);
+      return looks_like_esri_ascii(start) || looks_like_xyz(start);
     } catch (const InputError&) {
       return false;
     }
   }
 
-  const aiImporterDesc* GetInfo() const override {
-    static constexpr aiImporterDesc kDescription = {
-        "effuse ESRI ASCII grid importer", "effuse", "", "", aiImporterFlags_SupportTextFlavour, 0, 0, 0, 0, "asc"};
-    return &kDescription;
-  }
+  const aiImporterDesc* GetInfo() const override { return &description_; }
 
   void SetupProperties(const Assimp::Importer* importer) override {
-    stride_ = std::max(1, importer->GetPropertyInteger("EFFUSE_DEM_STRIDE", 1));
+    stride_ = std::max(0, importer->GetPropertyInteger("EFFUSE_DEM_STRIDE", 0));
   }
 
  protected:
   void InternReadFile(const std::string& file, aiScene* scene, Assimp::IOSystem* files) override {
     try {
-      DemGrid grid = parse_esri_ascii(read_stream(*files, file, std::string::npos), file);
+      std::vector<std::filesystem::path> all = {file};
+      all.insert(all.end(), request_.more.begin(), request_.more.end());
+      const auto read_text = [&](const std::filesystem::path& path) { return read_stream(*files, path.string(), std::string::npos); };
+      DemGrid grid = place_dem(all, request_.options, read_text);
       fill(*scene, grid);
       if (result_) result_->grid = std::move(grid);
     } catch (const InputError& error) {
@@ -117,7 +128,9 @@ class AscImporter final : public Assimp::BaseImporter {
 
  private:
   void fill(aiScene& scene, const DemGrid& grid) const {
-    std::unique_ptr<aiMesh> mesh = make_mesh(grid, stride_);
+    constexpr int kOverviewPosts = 256;
+    const int stride = stride_ > 0 ? stride_ : std::max(1, std::max(grid.nx, grid.ny) / kOverviewPosts);
+    std::unique_ptr<aiMesh> mesh = make_mesh(grid, stride);
     if (mesh->mNumFaces == 0) mesh = make_mesh(grid, 1);  // a coarse net may catch nothing but holes
     scene.mMaterials = new aiMaterial* [1] { new aiMaterial };
     scene.mNumMaterials = 1;
@@ -126,19 +139,43 @@ class AscImporter final : public Assimp::BaseImporter {
     scene.mRootNode = new aiNode("terrain");
     scene.mRootNode->mMeshes = new unsigned[1]{0};
     scene.mRootNode->mNumMeshes = 1;
-    scene.mMetaData = aiMetadata::Alloc(4);
+    scene.mMetaData = aiMetadata::Alloc(5);
     scene.mMetaData->Set(0, "origin_x", grid.corner.x());
     scene.mMetaData->Set(1, "origin_y", grid.corner.y());
     scene.mMetaData->Set(2, "cell_x", grid.spacing.x());
     scene.mMetaData->Set(3, "cell_y", grid.spacing.y());
+    scene.mMetaData->Set(4, "crs", aiString(grid.crs.substr(0, 1000)));
   }
 
   std::shared_ptr<DemResult> result_;
-  int stride_ = 1;
+  DemRequest request_;
+  std::string extensions_;
+  aiImporterDesc description_ = {};
+  int stride_ = 0;
 };
 
 }  // namespace
 
-Assimp::BaseImporter* make_asc_importer(std::shared_ptr<DemResult> result) { return new AscImporter(std::move(result)); }
+Assimp::BaseImporter* make_dem_importer(std::shared_ptr<DemResult> result, DemRequest request) { return new DemImporter(std::move(result), std::move(request)); }
+
+DemGrid import_dem(const std::vector<std::filesystem::path>& files, const DemOptions& options) {
+  CHECK(!files.empty());
+  // Texts are held in memory; of rasters only what is asked for.
+  constexpr std::uint64_t kLargestText = std::uint64_t{8} << 30;
+  for (const std::filesystem::path& file : files) check_input(file, lower_extension(file) == ".asc" || lower_extension(file) == ".xyz" ? kLargestText : std::numeric_limits<std::uint64_t>::max(), "a terrain");
+  const auto result = std::make_shared<DemResult>();
+  AssimpReader reader;
+  // The ending tells assimp who reads: a grid under another name is one all the same.
+  std::string extension = lower_extension(files.front());
+  if (extension.empty()) extension = ".";
+  reader.add(make_dem_importer(result, {options, {files.begin() + 1, files.end()}}), extension.substr(1));
+  try {
+    reader.read_in_place(files.front(), 0);
+  } catch (const InputError&) {
+    if (!result->fault) throw;
+  }
+  if (result->fault) std::rethrow_exception(result->fault);
+  return std::move(result->grid);
+}
 
 }  // namespace effuse::importers

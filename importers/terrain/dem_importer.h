@@ -1,9 +1,12 @@
 #pragma once
 
 #include <exception>
+#include <filesystem>
 #include <memory>
+#include <vector>
 
 #include "importers/terrain/dem_grid.h"
+#include "importers/terrain/dem_options.h"
 
 namespace Assimp {
 class BaseImporter;
@@ -17,13 +20,21 @@ struct DemResult {
   std::exception_ptr fault;  ///< the InputError with its line, of which assimp keeps only the words
 };
 
-/// An importer of ESRI ASCII grids (.asc, or any file that begins as one) for registration with assimp. Reads
-/// through assimp's IOSystem and makes a scene with one mesh: two triangles a cell, holes left out, positions
-/// relative to the south-west post, which stands in the scene's metadata as double: "origin_x", "origin_y",
-/// "cell_x", "cell_y". result (may be null) receives the exact grid.
+/// How, and what besides the file that assimp is asked for.
+struct DemRequest {
+  DemOptions options;
+  std::vector<std::filesystem::path> more;  ///< further files of the mosaic
+};
+
+/// An importer of grids of heights (all that import_dem reads, by ending, or as ESRI ASCII and XYZ by the first bytes) for
+/// registration with assimp. Texts are read through assimp's IOSystem, others where they lie. Makes a scene with one mesh:
+/// two triangles a cell, holes left out, positions in metres relative to the south-west post, which stands in the scene's
+/// metadata as double: "origin_x", "origin_y", "cell_x", "cell_y", and "crs" (its first 1000 bytes). result (may be null)
+/// receives the exact grid.
 ///
-/// Property "EFFUSE_DEM_STRIDE" (integer, 1): take every n-th post for the scene's mesh; the exact grid keeps all.
+/// Property "EFFUSE_DEM_STRIDE" (integer): take every n-th post for the scene's mesh; absent: as many as make it about
+/// 256 posts wide. The exact grid keeps all.
 /// The caller owns what is returned; Importer::RegisterLoader takes it over.
-Assimp::BaseImporter* make_asc_importer(std::shared_ptr<DemResult> result);
+Assimp::BaseImporter* make_dem_importer(std::shared_ptr<DemResult> result, DemRequest request = {});
 
 }  // namespace effuse::importers

@@ -55,14 +55,32 @@ class Words {
   int line_ = 1;
 };
 
-double number(std::string_view word, const Place& place, std::string_view what) {
-  double value = 0;
-  if (parse_number(word, value)) return value;
-  if (word.empty()) throw InputError(place, fmt::format("the file ends where {} should stand", what));
-  std::string advice;
-  if (word.find(',') != std::string_view::npos) advice = "; decimals want a point, not a comma";
-  throw InputError(place, fmt::format("found {}, wanted {}: a number{}", quote(word), what, advice));
-}
+/// Numbers of one file: with decimal points, or all with decimal commas, as some countries' programs write them.
+class Numbers {
+ public:
+  double read(std::string_view word, const Place& place, std::string_view what) {
+    double value = 0;
+    const bool has_comma = word.find(',') != std::string_view::npos;
+    if (!has_comma && parse_number(word, value)) {
+      points_ |= word.find('.') != std::string_view::npos;
+      if (!points_ || !commas_) return value;
+    } else if (has_comma && word.find('.') == std::string_view::npos) {
+      std::string point(word);
+      point[point.find(',')] = '.';
+      commas_ |= parse_number(point, value);
+      if (commas_ && !points_ && parse_number(point, value)) return value;
+    }
+    if (word.empty()) throw InputError(place, fmt::format("the file ends where {} should stand", what));
+    std::string advice;
+    if (commas_ && points_) advice = "; the file has decimals with points and with commas, which may be thousands";
+    else if (has_comma) advice = "; at most one comma, as decimal point";
+    throw InputError(place, fmt::format("found {}, wanted {}: a number{}", quote(word), what, advice));
+  }
+  bool commas() const { return commas_; }
+
+ private:
+  bool points_ = false, commas_ = false;
+};
 
 struct Header {
   std::map<std::string, double> values;
@@ -75,13 +93,13 @@ struct Header {
 };
 
 /// Reads keys and values up to the first word that is a number; that word is handed out.
-Header read_header(Words& words, std::string_view& first_value) {
+Header read_header(Words& words, Numbers& numbers, std::string_view& first_value) {
   Header header;
   for (;;) {
     const std::string_view word = words.next();
     const Place place = words.place();
     double ignored = 0;
-    if (word.empty() || parse_number(word, ignored)) {
+    if (word.empty() || parse_number(word.substr(0, word.find(',')), ignored)) {
       first_value = word;
       return header;
     }
@@ -91,7 +109,7 @@ Header read_header(Words& words, std::string_view& first_value) {
         throw InputError(place, fmt::format("is not an ESRI ASCII grid: it begins with {}, wanted ncols", quote(word)));
       }
       // A word that begins like a number stands among the heights.
-      if (word.find_first_of("0123456789") == 0 || word.find(',') != std::string_view::npos) number(word, place, "a height");
+      if (word.find_first_of("0123456789") == 0 || word.find(',') != std::string_view::npos) numbers.read(word, place, "a height");
       const std::string nearest = nearest_name(key, kKeys);
       throw InputError(place, fmt::format("found {}, wanted a key of the header or a height{}", quote(word),
                                           nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest)));
@@ -99,7 +117,7 @@ Header read_header(Words& words, std::string_view& first_value) {
     if (key == "nodata") key = "nodata_value";
     if (header.values.count(key)) throw InputError(place, fmt::format("'{}' is given twice", key));
     const std::string_view value = words.next();
-    header.values[key] = number(value, words.place(), key);
+    header.values[key] = numbers.read(value, words.place(), key);
     header.places[key] = words.place();
   }
 }
@@ -140,7 +158,8 @@ bool looks_like_esri_ascii(std::string_view text) {
 DemGrid parse_esri_ascii(std::string_view text, const std::string& name) {
   Words words(text, name);
   std::string_view word;
-  const Header header = read_header(words, word);
+  Numbers numbers;
+  const Header header = read_header(words, numbers, word);
 
   // What is missing, all at once.
   std::string missing;
@@ -187,7 +206,7 @@ DemGrid parse_esri_ascii(std::string_view text, const std::string& name) {
   for (std::uint64_t n = 0; n < promised; ++n, word = words.next()) {
     if (word.empty())
       throw InputError(words.place(), fmt::format("the file ends after {} of {} heights ({} x {})", n, promised, grid.nx, grid.ny));
-    double z = number(word, words.place(), "a height");
+    double z = numbers.read(word, words.place(), "a height");
     const bool nan = std::isnan(z);
     if (std::isinf(z)) throw InputError(words.place(), fmt::format("found {}, wanted a height", quote(word)));
     if (nan || declared(z)) {
@@ -206,6 +225,19 @@ DemGrid parse_esri_ascii(std::string_view text, const std::string& name) {
     const std::uint64_t row = n / static_cast<std::uint64_t>(grid.nx), column = n % static_cast<std::uint64_t>(grid.nx);
     grid.z[(static_cast<std::uint64_t>(grid.ny) - 1 - row) * static_cast<std::uint64_t>(grid.nx) + column] = z;
   }
+  // Some writers say at the end what stood for missing data.
+  if (!nodata && (lower(word) == "nodata_value" || lower(word) == "nodata")) {
+    const std::string_view value = words.next();
+    const double mark = numbers.read(value, words.place(), "nodata_value");
+    for (Real& z : grid.z)
+      if (z == mark || static_cast<float>(z) == static_cast<float>(mark)) {
+        z = std::numeric_limits<double>::quiet_NaN();
+        ++grid.nodata;
+      }
+    undeclared.erase(mark);
+    grid.notes.push_back(fmt::format("the nodata value {} stands at the end of the file", value));
+    word = words.next();
+  }
   if (!word.empty())
     throw InputError(words.place(), fmt::format("more than the {} x {} = {} heights promised: {} is one too many", grid.nx, grid.ny,
                                                 promised, quote(word)));
@@ -219,13 +251,11 @@ DemGrid parse_esri_ascii(std::string_view text, const std::string& name) {
     }
   if (!whole_cell) throw InputError({name}, fmt::format("no cell has four heights: {} of {} are nodata", grid.nodata, promised));
 
-  if (grid.nodata > 0) grid.notes.push_back(fmt::format("{} of {} posts have no data and are left as holes", grid.nodata, promised));
+  if (grid.nodata > 0) grid.notes.push_back(fmt::format("{} of {} posts have no data", grid.nodata, promised));
   if (nans > 0) grid.notes.push_back(fmt::format("{} of them are written as NaN", nans));
   for (const auto& [value, times] : undeclared)
     grid.notes.push_back(fmt::format("{} posts of {} are taken for missing data, though the header does not say so", times, value));
-  if (grid.spacing.maxCoeff() < 0.02 && std::abs(grid.corner.x()) <= 360 && std::abs(grid.corner.y()) <= 90)
-    grid.notes.push_back(fmt::format("posts {} m apart near x {}, y {}: these look like degrees; a terrain wants metres (reproject it)",
-                                     grid.spacing.x(), grid.corner.x(), grid.corner.y()));
+  if (numbers.commas()) grid.notes.push_back("numbers with decimal commas");
   return grid;
 }
 

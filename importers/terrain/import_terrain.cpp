@@ -6,16 +6,13 @@
 #include <cmath>
 #include <utility>
 
+#include "geometry/base/check.h"
 #include "geometry/base/error.h"
 #include "geometry/base/zones.h"
 #include "geometry/mesh/measure.h"
 #include "geometry/mesh/validate.h"
-#include "importers/assimp_reader.h"
-#include "importers/input_file.h"
 #include "importers/mesh/import_mesh.h"
-#include "importers/terrain/dem_importer.h"
-#include "importers/terrain/esri_ascii.h"
-#include "importers/terrain/projection.h"
+#include "importers/terrain/import_dem.h"
 
 namespace effuse::importers {
 
@@ -23,40 +20,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::uint64_t kGridLimit = std::uint64_t{8} << 30;  // bytes
-constexpr int kOverviewPosts = 256;                           // a side, of the mesh in assimp's scene: the exact grid is what counts
-
 /// The origin of the local frame: whole metres, so that it is exact in any text.
 Vec3 origin_below(const Vec2& south_west) { return Vec3(std::floor(south_west.x()), std::floor(south_west.y()), 0); }
-
-TerrainImport from_grid(DemGrid grid, const std::string& name, const TerrainImportOptions& options) {
-  const Vec3 origin = origin_below(grid.corner);
-  const Vec2 corner = grid.corner - origin.head<2>();
-  try {
-    geometry::HeightField field(corner, grid.spacing, grid.nx, grid.ny, std::move(grid.z));
-    return {geometry::Terrain::from_height_field(std::move(field), {origin, grid.crs}, options.temperature), std::move(grid.notes)};
-  } catch (const InputError& error) {
-    throw InputError({name}, error.faults().front().message);
-  }
-}
-
-DemGrid read_grid(const fs::path& file, const std::string& bytes) {
-  ZONE("import.grid");
-  const auto result = std::make_shared<DemResult>();
-  AssimpReader reader;
-  reader.add(make_asc_importer(result), "asc");
-  reader.set_integer("EFFUSE_DEM_STRIDE", std::max(1, static_cast<int>(std::sqrt(static_cast<double>(bytes.size()) / 4) / kOverviewPosts)));
-  // The ending tells assimp who reads: a grid under another name is one all the same.
-  fs::path name = file;
-  if (lower_extension(file) != ".asc") name += ".asc";
-  try {
-    reader.read(name, bytes, 0);
-  } catch (const InputError&) {
-    if (!result->fault) throw;
-  }
-  if (result->fault) std::rethrow_exception(result->fault);
-  return std::move(result->grid);
-}
 
 /// Ground faces up: sum of area vectors [m^2], twice.
 Vec3 facing(const geometry::TriMesh& mesh) {
@@ -84,7 +49,7 @@ TerrainImport from_mesh(MeshImport import, const std::string& name, const Terrai
   const Vec3 origin = origin_below(geometry::bounds(mesh).min().head<2>());
   for (Vec3& position : mesh.positions) position -= origin;
   try {
-    return {geometry::Terrain::from_mesh(std::move(mesh), {origin, options.crs}, options.temperature), std::move(import.notes)};
+    return {geometry::Terrain::from_mesh(std::move(mesh), {origin, options.dem.crs}, options.temperature), std::move(import.notes)};
   } catch (const InputError& error) {
     throw InputError({name}, error.faults().front().message);
   }
@@ -92,24 +57,26 @@ TerrainImport from_mesh(MeshImport import, const std::string& name, const Terrai
 
 }  // namespace
 
-TerrainImport import_terrain(const fs::path& file, const TerrainImportOptions& options) {
-  ZONE("import.terrain");
-  const std::string extension = lower_extension(file);
-  {
-    const std::string bytes = read_input(file, kGridLimit, "a terrain");
-    if (extension == ".asc" || looks_like_esri_ascii(bytes)) {
-      DemGrid grid = read_grid(file, bytes);
-      grid.crs = options.crs.empty() ? read_projection(file, grid.notes) : options.crs;
-      return from_grid(std::move(grid), file.string(), options);
-    }
+TerrainImport terrain_from_grid(DemGrid grid, const std::string& name, const TerrainImportOptions& options) {
+  const Vec3 origin = origin_below(grid.corner);
+  const Vec2 corner = grid.corner - origin.head<2>();
+  try {
+    geometry::HeightField field(corner, grid.spacing, grid.nx, grid.ny, std::move(grid.z));
+    return {geometry::Terrain::from_height_field(std::move(field), {origin, grid.crs}, options.temperature), std::move(grid.notes)};
+  } catch (const InputError& error) {
+    throw InputError({name}, error.faults().front().message);
   }
-  for (const char* raster : {".tif", ".tiff", ".hgt", ".bil", ".dem", ".flt", ".vrt", ".img", ".nc", ".grd"})
-    if (extension == raster)
-      throw InputError({file.string()}, fmt::format("rasters ending in {} are not read: turn it into an ESRI ASCII grid in metres "
-                                                    "(gdal_translate -of AAIGrid IN OUT.asc), or give a mesh",
-                                                    extension));
+}
 
-  return from_mesh(import_mesh(file), file.string(), options);
+TerrainImport import_terrain(const fs::path& file, const TerrainImportOptions& options) { return import_terrain(std::vector<fs::path>{file}, options); }
+
+TerrainImport import_terrain(const std::vector<fs::path>& files, const TerrainImportOptions& options) {
+  ZONE("import.terrain");
+  CHECK(!files.empty());
+  if (files.size() == 1 && !is_dem(files.front())) return from_mesh(import_mesh(files.front()), files.front().string(), options);
+  for (const fs::path& file : files)
+    if (!is_dem(file)) throw InputError({file.string()}, "is no grid of heights: only those make a mosaic");
+  return terrain_from_grid(import_dem(files, options.dem), files.front().string(), options);
 }
 
 }  // namespace effuse::importers

@@ -38,7 +38,7 @@ double disk_per_frame(double particles, const skin::SkinSettings& s) {
 /// Bytes beyond the effects': the program with its libraries, the terrain, and the skin of the last frame as it is made, written and
 /// drawn. Measured on Maunga Whau at edges of 0.5, 0.25 and 0.15 with one format, all, and pictures: within a quarter, voronoi too.
 double memory_of_skin(double particles, std::size_t posts, const skin::SkinSettings& s) {
-  double bytes = 52e6 + static_cast<double>(posts) * (s.preview ? 460 : 225);
+  double bytes = 79e6 + static_cast<double>(posts) * (s.preview ? 460 : 225);
   if (!s.ply && !s.obj && !s.glb && !s.vdb && !s.preview) return bytes;
   bytes += particles * (3500 * std::pow(0.5 / s.voxel, 2) + (s.detail.kind == skin::SkinKind::kNoise ? 0 : 5000));
   bytes += triangles(particles, s) * (155 + 40 * s.obj + 60 * s.glb + 40 * s.preview);
@@ -83,7 +83,7 @@ ExitCode check(const CheckCommand& command, const CommonOptions& common) {
   const double frame_s = 80e-6 * sum.mean_particles + (loaded->skin.preview ? 7e-7 * loaded->skin.picture.width * loaded->skin.picture.height : 0);
   const SolidThings& solids = loaded->solids;
   const bool drawn = loaded->skin.preview || (loaded->skin.ply && solids.any_moves());
-  const double seconds = sum.seconds + scene.frames * (frame_s + (drawn ? solids.frame_seconds() : 0));
+  const double seconds = sum.seconds + solids.start_seconds() + scene.frames * (frame_s + (drawn ? solids.frame_seconds() : 0));
   const double disk = scene.frames * (disk_per_frame(sum.mean_particles, loaded->skin) + (loaded->skin.ply && solids.any_moves() ? 94.0 * static_cast<double>(solids.triangles()) : 0));
   const double memory = sum.bytes + solids.memory() + memory_of_skin(sum.particles, loaded->terrain->mesh().positions.size(), loaded->skin);
 

@@ -39,6 +39,24 @@ ExitCode check(const CheckCommand& command, const CommonOptions& common);
 ExitCode info(const std::vector<std::filesystem::path>& files, const CommonOptions& common);
 ExitCode effects(const CommonOptions& common);
 
+/// `effuse import`: terrain into the form another program wants. Lengths may carry their unit.
+struct ImportCommand {
+  std::vector<std::filesystem::path> files;  ///< one terrain, or the tiles of one
+  std::filesystem::path output;              ///< .tif .asc: a grid; .ply .obj .glb .stl: a mesh
+  std::string max_error;                     ///< of a grid's mesh at its posts [m]; empty: all posts become vertices
+  std::string crs, file_crs;                 ///< to work in; of the files
+  std::vector<double> crop;                  ///< west, south, east, north; empty: all
+  std::string resample;                      ///< "10 m", "cubic", or both with a comma; empty: as the file has them
+  std::string vertical_unit;                 ///< of the files' heights
+  std::string holes = "hole";                ///< or "fill", "error"
+  std::string pits = "keep";                 ///< or "fill", "breach"; "fill:2m": only those up to 2 m deep
+  std::vector<double> size, range;           ///< of an image's ground and heights [m]
+  std::uint64_t max_posts = 50'000'000;
+  std::string up = "z";                      ///< of a mesh
+};
+/// Says each thing that it changed. Nothing is written when the input is refused.
+ExitCode import_terrain_file(const ImportCommand& command, const CommonOptions& common);
+
 /// `effuse skin`: the skin alone, for anybody's particles; lengths in the particles' own unit. Named as splashsurf's users
 /// know them. Not called skin, which is a namespace.
 struct SkinCommand {

@@ -116,6 +116,24 @@ void add_skin_options(CLI::App* verb, effuse::SkinCommand& skin) {
   for (const char* name : {"-r", "-l", "-c", "-t", "--drop-volume", "--coarsen", "--amplitude", "--edge", "--particle-aabb-min", "--particle-aabb-max"}) verb->get_option(name)->check(finite);
 }
 
+void add_import_options(CLI::App* verb, effuse::ImportCommand& import) {
+  verb->add_option("file", import.files, "a grid (GeoTIFF, ESRI ASCII, HGT, USGS DEM, flt, bil, XYZ, netCDF, PNG) or several as a mosaic, or a mesh")->required();
+  verb->add_option("-o,--output", import.output, "file to write: .tif .asc a grid; .ply .obj .glb .stl a mesh")->required();
+  verb->add_option("--max-error", import.max_error, "of the mesh of a grid: no post lies farther above or below it ('0.5 m'); absent: every post is a vertex");
+  verb->add_option("--crop", import.crop, "west south east north in the output's coordinates; of a grid in degrees, degrees do too")->expected(4)->delimiter(',');
+  verb->add_option("--crs", import.crs, "coordinate system to work in, in metres: EPSG:32616, WKT, PROJ [the file's, or the UTM zone of one in degrees]");
+  verb->add_option("--file-crs", import.file_crs, "what the file's coordinates are in, when it does not say or says it wrong");
+  verb->add_option("--resample", import.resample, "distance between posts, method (auto, nearest, bilinear, cubic, average), or both: 10m,cubic [as the file has them]");
+  verb->add_option("--vertical-unit", import.vertical_unit, "of the file's heights: m, ft, us-ft, cm [as the file says, or m]");
+  verb->add_option("--holes", import.holes, "posts without data: hole leaves them, fill spans a smooth surface, error refuses [hole]");
+  verb->add_option("--pits", import.pits, "closed depressions: keep, fill to where they overflow, breach drains them by a notch; fill:2m only those up to 2 m deep [keep]");
+  verb->add_option("--size", import.size, "of an image without a place: east-west north-south in metres, first post to last")->expected(2)->delimiter(',')->check(CLI::PositiveNumber);
+  verb->add_option("--range", import.range, "of an image: heights in metres of its darkest and brightest values")->expected(2)->delimiter(',');
+  verb->add_option("--max-posts", import.max_posts, "refuse more [50000000]")->check(CLI::Range(std::uint64_t{4}, std::uint64_t{4000000000}));
+  verb->add_option("--up", import.up, "of a mesh: its axis that points up [z]")->check(CLI::IsMember({"y", "z"}));
+  verb->footer("Says what it found, assumed and changed. Exit codes: 0 done, 2 wrong use or bad input, 5 out of disk or memory.");
+}
+
 void add_set(CLI::App* verb, std::vector<std::string>& assignments) {
   verb->add_option("--set", assignments, "overrides a value of the scene, one word: --set lava.spacing='2 m' --set preview.target=[10,20]; may be given several times")
       ->type_name("KEY=VALUE")
@@ -130,11 +148,6 @@ bool out_of_resources(const std::system_error& error) {
 }
 
 }  // namespace
-
-void effuse::print_document(const std::string& json) {
-  const std::string text = json + "\n";
-  std::fwrite(text.data(), 1, text.size(), stdout);  // main() looks whether it went out
-}
 
 int main(int argc, char** argv) {
   open_standard_streams();
@@ -173,6 +186,10 @@ int main(int argc, char** argv) {
   CLI::App* info_verb = add_common(app.add_subcommand("info", "facts of files: terrain, meshes, volumes, scenes, runs (their folder, or run.json in it)"));
   info_verb->add_option("file", files, "files")->required();
 
+  effuse::ImportCommand import;
+  CLI::App* import_verb = add_common(app.add_subcommand("import", "terrain as other programs want it: reprojected, cropped, resampled, filled; grids as meshes to a stated error"));
+  add_import_options(import_verb, import);
+
   CLI::App* effects_verb = add_common(app.add_subcommand("effects", "the effects there are, and their parameters"));
 
   effuse::SkinCommand skin;
@@ -194,10 +211,10 @@ int main(int argc, char** argv) {
 
   // A typing error in the verb: name the nearest one instead of CLI11's list.
   if (argc > 1 && argv[1][0] != '-') {
-    const std::vector<std::string> verbs = {"run", "check", "info", "effects", "skin", "study"};
+    const std::vector<std::string> verbs = {"run", "check", "info", "import", "effects", "skin", "study"};
     if (std::find(verbs.begin(), verbs.end(), argv[1]) == verbs.end()) {
       const std::string nearest = effuse::nearest_name(argv[1], verbs);
-      return report(ExitCode::kBadInput, fmt::format("no verb '{}'; {}", argv[1], nearest.empty() ? "there are run, check, info, effects, skin, study" : "did you mean '" + nearest + "'?"), asks_json);
+      return report(ExitCode::kBadInput, fmt::format("no verb '{}'; {}", argv[1], nearest.empty() ? "there are run, check, info, import, effects, skin, study" : "did you mean '" + nearest + "'?"), asks_json);
     }
   }
   try {
@@ -214,6 +231,7 @@ int main(int argc, char** argv) {
     if (*run_verb) return flushed(effuse::run(run, common));
     if (*check_verb) return flushed(effuse::check(check, common));
     if (*info_verb) return flushed(effuse::info(files, common));
+    if (*import_verb) return flushed(effuse::import_terrain_file(import, common));
     if (*effects_verb) return flushed(effuse::effects(common));
     if (*skin_verb) return flushed(effuse::skin_particles(skin, common));
     if (*study_verb) return flushed(effuse::run_studies(study, common));

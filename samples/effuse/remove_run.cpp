@@ -25,7 +25,7 @@ void remove_run(const fs::path& folder) {
     for (const fs::path& file : found) fs::remove(file);
     fs::remove(folder / kind.folder, error);  // if nothing is left in it
   }
-  for (const char* file : {"flow.csv", "run.json", "manifest.json"}) fs::remove(folder / file);
+  for (const char* file : {"flow.csv", "bodies.csv", "bodies.glb", "run.json", "manifest.json"}) fs::remove(folder / file);
 }
 
 }  // namespace effuse

@@ -19,6 +19,7 @@
 #include "geometry/base/log.h"
 #include "geometry/base/parallel.h"
 #include "geometry/base/zones.h"
+#include "samples/effuse/body_writer.h"
 #include "samples/effuse/commands.h"
 #include "samples/effuse/flow_writer.h"
 #include "samples/effuse/frame_writer.h"
@@ -199,7 +200,7 @@ std::string summary(const Profile& profile) {
 }
 
 /// Restores the newest checkpoint that is whole, and what the maps had gathered by then; false when there is none at all.
-bool go_on(const fs::path& folder, LoadedScene& loaded, FlowWriter& flow_writer) {
+bool go_on(const fs::path& folder, LoadedScene& loaded, FlowWriter& flow_writer, BodyWriter& body_writer) {
   const std::vector<fs::path> checkpoints = flow::checkpoints(folder);
   bool whole = false;
   for (const fs::path& checkpoint : checkpoints) {
@@ -209,6 +210,7 @@ bool go_on(const fs::path& folder, LoadedScene& loaded, FlowWriter& flow_writer)
       continue;
     }
     loaded.simulation->restore(bytes, loaded.key, checkpoint.string());
+    if (!body_writer.restore()) throw InputError(Place{(folder / "bodies.csv").string()}, "is missing, damaged or shorter than the checkpoint, and the run goes on from it; --force starts anew");
     if (flow_writer.restore()) return true;
     whole = true;
     log_warning(fmt::format("{} has no sound record of the maps and flow.csv beside it, going back to the one before", checkpoint.string()));
@@ -244,10 +246,11 @@ ExitCode run(const RunCommand& command, const CommonOptions& common) {
                                                          command.folder.empty() ? "; -o names the folder when it is another" : ""));
 
   FlowWriter flow_writer(*loaded, folder);
+  BodyWriter body_writer(*loaded, folder);
   const OutputFolder held(folder);
   RunRecord record(*loaded, folder);
   if (command.resume) {
-    if (go_on(folder, *loaded, flow_writer)) {
+    if (go_on(folder, *loaded, flow_writer, body_writer)) {
       record.read(simulation.frame());
       log_info(fmt::format("going on after frame {}", simulation.frame()));
     } else {
@@ -269,8 +272,15 @@ ExitCode run(const RunCommand& command, const CommonOptions& common) {
     return text;
   };
 
-  // The record of the maps before the checkpoint it belongs to.
+  const auto written = [&] {
+    std::vector<std::pair<std::string, std::string>> files = flow_writer.files();
+    for (auto& file : body_writer.files()) files.push_back(std::move(file));
+    return files;
+  };
+
+  // The records of maps and bodies before the checkpoint they belong to.
   const auto save_state = [&] {
+    body_writer.write_series();
     flow_writer.save_record();
     flow::write_checkpoint(folder, simulation, loaded->key);
     flow_writer.remove_old_records();
@@ -292,13 +302,14 @@ ExitCode run(const RunCommand& command, const CommonOptions& common) {
       const FrameWriter::Result result = writer.write_frame(simulation);
       record.add_frame(simulation, result);
       flow_writer.add_frame();
+      body_writer.add_frame();
       progress.frame_done(simulation.frame(), fmt::format("{}, {} triangles", status(), result.triangles));
       if (simulation.frame() % loaded->skin.checkpoint_every == 0 || simulation.frame() == scene.frames) {
         // The record first: killed in between, it holds more frames than the checkpoint, never fewer.
         record.write(record.document(simulation, profile, "running"));
         save_state();
         flow_writer.write_series();
-        writer.write_manifest(simulation.frame(), flow_writer.files());
+        writer.write_manifest(simulation.frame(), written());
       }
     }
     if (code == ExitCode::kInterrupted) {
@@ -323,7 +334,9 @@ ExitCode run(const RunCommand& command, const CommonOptions& common) {
 
   flow_writer.write_series();
   flow_writer.write_maps();
-  writer.write_manifest(simulation.frame(), flow_writer.files());
+  body_writer.write_series();
+  body_writer.write_animation();
+  writer.write_manifest(simulation.frame(), written());
   const ordered_json document = record.document(simulation, profile, outcome);
   record.write(document);
   if (!common.quiet && !common.json) {

@@ -9,6 +9,7 @@
 #include "geometry/base/files.h"
 #include "geometry/base/zones.h"
 #include "skin/write/emission_ramp.h"
+#include "skin/write/glb_builder_internal.h"
 #include "skin/write/mesh_arrays.h"
 #include "skin/write/png.h"
 #include "skin/write/write_mesh.h"
@@ -17,103 +18,8 @@ namespace effuse::skin {
 
 using geometry::TriMesh;
 using geometry::VertexAttribute;
-using Json = nlohmann::ordered_json;
 
 namespace {
-
-// glTF's names for numbers (specification 5.1.3, 5.11.5, 5.26).
-enum : int { kUnsignedShort = 5123, kUnsignedInt = 5125, kFloat = 5126 };
-enum : int { kVertexData = 34962, kIndexData = 34963 };
-enum : int { kLinear = 9729, kClampToEdge = 33071 };
-
-/// Our z up to glTF's y up.
-Eigen::Vector3f y_up(const Vec3& v) { return Vec3(v.x(), v.z(), -v.y()).cast<float>(); }
-
-/// The JSON and the binary chunk, growing together.
-class GlbBuilder {
- public:
-  Json json;
-
-  /// Appends bytes as a buffer view, 4-byte aligned; its index. target 0: none (pictures).
-  int add_view(const std::string& bytes, int target) {
-    bin_.resize((bin_.size() + 3) / 4 * 4, '\0');
-    Json view{{"buffer", 0}, {"byteOffset", bin_.size()}, {"byteLength", bytes.size()}};
-    if (target != 0) view["target"] = target;
-    bin_ += bytes;
-    json["bufferViews"].push_back(std::move(view));
-    return static_cast<int>(json["bufferViews"].size()) - 1;
-  }
-  int add_accessor(const std::string& bytes, int target, int component, std::size_t count, const char* type, Json more = Json::object()) {
-    Json accessor{{"bufferView", add_view(bytes, target)}, {"componentType", component}, {"count", count}, {"type", type}};
-    accessor.update(more);
-    json["accessors"].push_back(std::move(accessor));
-    return static_cast<int>(json["accessors"].size()) - 1;
-  }
-
-  /// The whole file: header, JSON chunk padded with blanks, binary chunk (left out when empty) with zeros.
-  std::string file(const std::filesystem::path& name) {
-    if (!bin_.empty()) {
-      bin_.resize((bin_.size() + 3) / 4 * 4, '\0');
-      json["buffers"] = Json::array({{{"byteLength", bin_.size()}}});
-    }
-    std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
-    text.resize((text.size() + 3) / 4 * 4, ' ');
-    const std::size_t total = 12 + 8 + text.size() + (bin_.empty() ? 0 : 8 + bin_.size());
-    if (total > std::numeric_limits<std::uint32_t>::max())
-      throw InputError({name.string()}, fmt::format("would be {} bytes, GLB holds at most 4294967295", total));
-    const auto u32 = [](std::size_t n) { return static_cast<std::uint32_t>(n); };
-    std::string out;
-    out.reserve(total);
-    append_bytes(out, std::uint32_t{0x46546C67});  // "glTF"
-    append_bytes(out, std::uint32_t{2});
-    append_bytes(out, u32(total));
-    append_bytes(out, u32(text.size()));
-    append_bytes(out, std::uint32_t{0x4E4F534A});  // "JSON"
-    out += text;
-    if (!bin_.empty()) {
-      append_bytes(out, u32(bin_.size()));
-      append_bytes(out, std::uint32_t{0x004E4942});  // "BIN"
-      out += bin_;
-    }
-    return out;
-  }
-
- private:
-  std::string bin_;
-};
-
-std::string bytes_of(const std::vector<Eigen::Vector3f>& values) {
-  return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(Eigen::Vector3f)};
-}
-
-int add_positions(GlbBuilder& glb, const std::vector<Vec3>& positions) {
-  std::vector<Eigen::Vector3f> turned(positions.size());
-  std::transform(positions.begin(), positions.end(), turned.begin(), y_up);
-  Eigen::Vector3f low = turned.front(), high = turned.front();
-  for (const Eigen::Vector3f& p : turned) {
-    low = low.cwiseMin(p);
-    high = high.cwiseMax(p);
-  }
-  const auto list = [](const Eigen::Vector3f& v) { return Json::array({v.x(), v.y(), v.z()}); };
-  return glb.add_accessor(bytes_of(turned), kVertexData, kFloat, turned.size(), "VEC3", {{"min", list(low)}, {"max", list(high)}});
-}
-
-int add_normals(GlbBuilder& glb, const std::vector<Vec3>& normals) {
-  std::vector<Eigen::Vector3f> turned(normals.size());
-  std::transform(normals.begin(), normals.end(), turned.begin(), y_up);
-  return glb.add_accessor(bytes_of(turned), kVertexData, kFloat, turned.size(), "VEC3");
-}
-
-/// Four shorts: alpha keeps readers right that expect four, and rows a multiple of four bytes long.
-int add_colors(GlbBuilder& glb, const VertexAttribute& color) {
-  const std::size_t n = color.values.size() / 3;
-  std::vector<std::uint16_t> shorts(4 * n, 65535);
-  for (std::size_t i = 0; i < n; ++i)
-    for (std::size_t k = 0; k < 3; ++k)
-      shorts[4 * i + k] = static_cast<std::uint16_t>(std::clamp(color.values[3 * i + k], 0.0f, 1.0f) * 65535.0f + 0.5f);
-  return glb.add_accessor({reinterpret_cast<const char*>(shorts.data()), shorts.size() * sizeof(std::uint16_t)}, kVertexData,
-                          kUnsignedShort, n, "VEC4", {{"normalized", true}});
-}
 
 int add_attribute(GlbBuilder& glb, const VertexAttribute& attribute) {
   constexpr std::array kTypes{"SCALAR", "VEC2", "VEC3", "VEC4"};

@@ -11,7 +11,7 @@
 /// Meshes for Blender, Houdini, ParaView and web viewers. Our own writers, because the libraries' drop the attributes
 /// (temperature, velocity, crust) that a shader needs, or write files that are wrong.
 ///
-/// All three: the file is whole or absent (geometry/base/files.h); a mesh without triangles, or without vertices, is a
+/// All of them: the file is whole or absent (geometry/base/files.h); a mesh without triangles, or without vertices, is a
 /// valid file too, so that a sequence has no gap before the lava comes; normals are always there (computed when the
 /// mesh has none: readers shade flat without). A mesh that cannot be written (index out of range, a number that is not
 /// finite, an attribute of the wrong length) is an InputError naming file and fault, a full disk a ResourceError.
@@ -22,8 +22,9 @@ using Metadata = std::vector<std::pair<std::string, std::string>>;
 
 /// Binary little-endian PLY: x y z float, nx ny nz (always: flat shading without), red green blue uchar sRGB from
 /// "color", every other attribute as float scalars of its name (velocity_x, ...). Faces: `list uchar uint
-/// vertex_indices`. Metadata as comments, all before the first element (some readers refuse later ones).
-void write_ply(const std::filesystem::path& file, const geometry::TriMesh& mesh, const Metadata& metadata = {});
+/// vertex_indices`. Metadata as comments, all before the first element (some readers refuse later ones). kDouble: x y z double.
+enum class PlyPositions { kFloat, kDouble };
+void write_ply(const std::filesystem::path& file, const geometry::TriMesh& mesh, const Metadata& metadata = {}, PlyPositions positions = PlyPositions::kFloat);
 
 /// The same with the regions: of each vertex, and of each triangle where labels has them, the id of the particle whose region it is
 /// in as `uint region`, its lower 32 bits; and where there are ids of more than that, `uint region_high`: id = region + 2^32 region_high.
@@ -48,5 +49,9 @@ void write_obj(const std::filesystem::path& file, const geometry::TriMesh& mesh,
 /// COLOR_0 stays the display colour: a reader that ignores emission still shows hot lava hot.
 /// A mesh without triangles writes a valid file without meshes.
 void write_glb(const std::filesystem::path& file, const geometry::TriMesh& mesh, const Metadata& metadata = {});
+
+/// Binary STL: positions as float and the triangles' own normals; no attributes. Its header of 80 bytes holds the metadata's
+/// "origin" and as much of its "crs" as fits; it never begins with "solid".
+void write_stl(const std::filesystem::path& file, const geometry::TriMesh& mesh, const Metadata& metadata = {});
 
 }  // namespace effuse::skin

@@ -8,6 +8,7 @@
 #include "geometry/base/parallel.h"
 #include "geometry/base/random.h"
 #include "geometry/terrain/terrain.h"
+#include "geometry/terrain/triangulate.h"
 #include "tests/geometry/terrain/fields.h"
 
 /// Contacts per second on Maunga Whau, one thread. Points lie cell by cell, as sorted particles do, at heights from
@@ -59,6 +60,31 @@ void mesh_contacts(benchmark::State& state) {
   run(state, Terrain::from_mesh(fields::maunga_whau().mesh()), static_cast<Real>(state.range(0)), static_cast<Real>(state.range(1)) / 100, 10000);
 }
 BENCHMARK(mesh_contacts)->Args({3, 100})->Args({3, 1000000})->Unit(benchmark::kMillisecond);
+
+/// Greedy insertion on a million posts of hills of many sizes, to an error in centimetres. The label: triangles, the error
+/// measured, and a hash of the mesh.
+void triangulation(benchmark::State& state) {
+  const int n = static_cast<int>(state.range(0));
+  std::vector<Real> z(static_cast<std::size_t>(n) * static_cast<std::size_t>(n));
+  for (int j = 0; j < n; ++j)
+    for (int i = 0; i < n; ++i) {
+      Real h = 0.2 * random_uniform(1, 0, static_cast<std::uint64_t>(j) * static_cast<std::uint64_t>(n) + static_cast<std::uint64_t>(i));
+      for (int octave = 0; octave < 9; ++octave) {
+        const Real f = 0.006 * std::pow(1.9, octave);
+        h += 150 * std::pow(0.45, octave) * std::sin(f * i + 1.3 * octave) * std::cos(0.83 * f * j + 0.7 * octave * octave);
+      }
+      z[static_cast<std::size_t>(j) * static_cast<std::size_t>(n) + static_cast<std::size_t>(i)] = h;
+    }
+  const HeightField field({0, 0}, {10, 10}, n, n, std::move(z));
+  const Real error = static_cast<Real>(state.range(1)) / 100;
+  TriMesh mesh;
+  for (auto _ : state) mesh = triangulate(field, error);
+  StateHash hash;
+  hash.add(std::span<const Vec3>(mesh.positions));
+  state.SetLabel(std::to_string(mesh.triangles.size()) + " triangles, " + std::to_string(vertical_error(field, mesh).at_posts) + " m off, " + hash.hex());
+  state.counters["posts/s"] = benchmark::Counter(static_cast<double>(n) * n, benchmark::Counter::kIsIterationInvariantRate);
+}
+BENCHMARK(triangulation)->Args({100, 100})->Args({1000, 500})->Args({1000, 100})->Args({1000, 20})->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace effuse::geometry

@@ -75,6 +75,33 @@ std::string little(float value) {
   return bytes;
 }
 
+std::string good_tiff() {
+  struct Entry {
+    int tag, type, count;
+    std::uint32_t value;
+  };
+  const std::size_t directory_end = 8 + 2 + 12 * 11 + 4;
+  std::string scale, tie, heights;
+  const auto f64 = [](std::string& to, double v) {
+    char bytes[8];
+    std::memcpy(bytes, &v, 8);
+    to.append(bytes, 8);
+  };
+  for (const double v : {10.0, 10.0, 0.0}) f64(scale, v);
+  for (const double v : {0.0, 0.0, 0.0, 2667400.0, 6478750.0, 0.0}) f64(tie, v);
+  for (int n = 0; n < 30; ++n) heights += little(static_cast<float>(100 + (n * 7) % 13));
+  const auto at = static_cast<std::uint32_t>(directory_end);
+  const std::vector<Entry> entries = {{256, 3, 1, 6}, {257, 3, 1, 5}, {258, 3, 1, 32}, {259, 3, 1, 1}, {262, 3, 1, 1}, {273, 4, 1, at + 72}, {278, 3, 1, 5}, {279, 4, 1, 120}, {339, 3, 1, 3}, {33550, 12, 3, at}, {33922, 12, 6, at + 24}};
+  std::string bytes = "II*";
+  const auto number = [&](std::uint32_t v, int count) {
+    for (int k = 0; k < count; ++k) bytes += static_cast<char>(v >> (8 * k) & 0xff);
+  };
+  number(0, 1), number(8, 4), number(static_cast<std::uint32_t>(entries.size()), 2);
+  for (const Entry& e : entries) number(static_cast<std::uint32_t>(e.tag), 2), number(static_cast<std::uint32_t>(e.type), 2), number(static_cast<std::uint32_t>(e.count), 4), number(e.value, 4);
+  number(0, 4);
+  return bytes + scale + tie + heights;
+}
+
 std::vector<Good> good_files() {
   std::string asc = "ncols 6\nnrows 5\nxllcorner 2667400\nyllcorner 6478700\ncellsize 10\nNODATA_value -9999\n";
   for (int n = 0; n < 30; ++n) asc += fmt::format("{}{}", 100 + (n * 7) % 13, n % 6 == 5 ? "\n" : " ");
@@ -104,7 +131,12 @@ std::vector<Good> good_files() {
   const std::string toml =
       "name = \"x\"\nseed = 7\n[lava]\nrate = \"30 m3/s\"\nhot = 1.5e3\npath = [[1, 2], [3.5, 4]]\non = true\n"
       "[[lava.vents]]\nat = { x = 1, y = 2 }\n[skin.\"odd key\"]\ntext = '''\nmany\nlines'''\n";
-  return {{"a.toml", toml},
+  // A GeoTIFF of 6 x 5 floats in one strip, written by hand: directory at byte 8, heights at its end.
+  std::string xyz = "x;y;z\n";
+  for (int n = 0; n < 30; ++n) xyz += fmt::format("{};{};{}.5\n", 10 * (n % 6), 10 * (n / 6), 100 + (n * 7) % 13);
+  return {{"a.tif", good_tiff()},
+          {"a.xyz", xyz},
+          {"a.toml", toml},
           {"a.asc", asc},
           {"a.obj", obj},
           {"a.off", "OFF\n# c\n8 6 0\n" + corners + faces},
@@ -120,7 +152,7 @@ void feed(const std::filesystem::path& file) {
     flow::Node scene = read_scene_file(file);
     // What was read can be written and read again.
     read_scene_text(to_toml(scene), "again");
-  } else if (extension == ".asc") {
+  } else if (extension == ".asc" || extension == ".tif" || extension == ".xyz") {
     import_terrain(file);
   } else {
     geometry::validate(import_mesh(file).mesh);

@@ -22,7 +22,7 @@ TEST(DescribeFile, AVolcanoIsAGridWithOneDeepCrater) {
   EXPECT_TRUE(contains(text, "61 x 87 posts, 10 x 10 m apart: 600 x 860 m")) << text;
   EXPECT_TRUE(contains(text, "heights: 94 to 195 m")) << text;
   EXPECT_TRUE(contains(text, "holes: none")) << text;
-  EXPECT_TRUE(contains(text, "New_Zealand_Map_Grid")) << text;
+  EXPECT_TRUE(contains(text, "New Zealand Map Grid (EPSG:27200)")) << text;
   EXPECT_TRUE(contains(text, "local origin: 2667405, 6478705, 0")) << text;
   EXPECT_TRUE(contains(text, "20 m deep, floor 148 m, spills at 168 m")) << text;
 }

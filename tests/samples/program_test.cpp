@@ -361,6 +361,88 @@ TEST_F(ProgramTest, TellsWhatIsWrongWithAnObstacleAtItsLine) {
   EXPECT_EQ(effuse({"check", with("[18, 24, 0]", "[18, 24, 0]")}).code, 0);
 }
 
+TEST_F(ProgramTest, RunsBodiesWithoutLavaAndGoesOnToTheSameBytes) {
+  const auto arguments = [&](const fs::path& out, const char* frames, const Arguments& more) {
+    Arguments all = {"run", kScenes / "wrecking-arm.toml", "-o", out, "--frames", frames, "--set", "preview.width=160", "--set", "preview.height=90", "--set", "preview.samples=1", "--set",
+                     "output.formats=[\"ply\", \"glb\"]", "--set", "output.checkpoint_every=3"};
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  };
+  const fs::path whole = folder_ / "whole", parts = folder_ / "parts";
+  const Outcome run = effuse(arguments(whole, "8", {}));
+  ASSERT_EQ(run.code, 0) << run.err;
+  EXPECT_EQ(run.err.find("not one particle"), std::string::npos) << run.err;
+  EXPECT_FALSE(fs::exists(whole / "frames" / "skin.0001.ply")) << "there is no lava to skin";
+  EXPECT_NE(read_file(whole / "frames" / "obstacles.0001.ply"), read_file(whole / "frames" / "obstacles.0008.ply"));
+  EXPECT_EQ(count(read_file(whole / "bodies.csv"), "\n"), 1u + 8 * 30) << "a line a frame and thing: 2 obstacles, 12 links, the ball, 15 blocks";
+  EXPECT_NE(read_file(whole / "bodies.glb").find("\"animations\""), std::string::npos);
+  EXPECT_NE(read_file(whole / "manifest.json").find("bodies.glb"), std::string::npos);
+  EXPECT_EQ(run_json(whole)["effects"]["bodies"]["bodies"], 28);
+  EXPECT_LT(run_json(whole)["effects"]["bodies"]["largest_joint_error"], 1e-4);
+
+  ASSERT_EQ(effuse(arguments(parts, "5", {"--threads", "1"})).code, 0);
+  ASSERT_EQ(effuse(arguments(parts, "8", {"--resume", "--threads", "2"})).code, 0);
+  expect_same_files(whole, parts, 16);
+  EXPECT_EQ(read_file(parts / "bodies.csv"), read_file(whole / "bodies.csv"));
+  EXPECT_EQ(read_file(parts / "bodies.glb"), read_file(whole / "bodies.glb"));
+  EXPECT_EQ(effuse({"check", whole / "scene.toml"}).code, 0) << "the resolved scene is one";
+  fs::remove(parts / "bodies.csv");
+  EXPECT_EQ(effuse(arguments(parts, "9", {"--resume"})).code, 2);
+  ASSERT_EQ(effuse(arguments(parts, "1", {"--force"})).code, 0);
+}
+
+TEST_F(ProgramTest, TellsBodiesAndJointsOfAScene) {
+  const Outcome check = effuse({"check", kScenes / "chain.toml"});
+  EXPECT_EQ(check.code, 0) << check.err;
+  EXPECT_NE(check.out.find("13 bodies of"), std::string::npos) << check.out;
+  EXPECT_NE(check.out.find("12 joints"), std::string::npos) << check.out;
+  EXPECT_NE(effuse({"info", kScenes / "chain.toml"}).out.find("13 bodies, 12 joints"), std::string::npos);
+  std::string text = read_file(kScenes / "chain.toml");
+  text.replace(text.find("\"world\", \"link.1\""), 17, "\"world\", \"lnk.1\"");
+  const Outcome wrong = effuse({"check", write("chain.toml", text)});
+  EXPECT_EQ(wrong.code, 2);
+  EXPECT_NE(wrong.err.find("chain.toml:22:"), std::string::npos) << wrong.err;
+  EXPECT_NE(wrong.err.find("did you mean 'link.1'?"), std::string::npos) << wrong.err;
+  EXPECT_EQ(count(wrong.err, "error: "), 1u) << wrong.err;
+}
+
+TEST_F(ProgramTest, TheReadmesChainIsAScene) {
+  const std::string readme = read_file(kScenes.parent_path().parent_path() / "README.md");
+  const std::size_t from = readme.find("[terrain.plane]"), to = readme.find("```", from);
+  ASSERT_NE(to, std::string::npos);
+  std::string text = readme.substr(from, to - from);
+  const Outcome plain = effuse({"check", write("readme.toml", "[film]\nframes = 24\n" + text)});
+  EXPECT_EQ(plain.code, 0) << plain.err;
+  EXPECT_NE(plain.out.find("10 bodies"), std::string::npos) << plain.out;
+  // What it says in comments does, too.
+  text.replace(text.find("# spring"), 2, "");
+  text.replace(text.find("kind = \"ball\""), 13, "kind = \"ball\"\ncone = \"40 deg\"\naxis = [1, 0, 0]");
+  const Outcome more = effuse({"check", write("readme.toml", "[film]\nframes = 24\n[bodies]\ncontact = \"penalty\"\npenalty_frequency = 50\n" + text)});
+  EXPECT_EQ(more.code, 0) << more.err;
+}
+
+TEST_F(ProgramTest, NamesWhatBlocksAVentWhenItCannotGoOn) {
+  std::string text = read_file(kScenes / "house.toml");
+  const auto put = [&](const std::string& from, const std::string& to) { text.replace(text.find(from), from.size(), to); };
+  put("gully.asc", (kScenes / "gully.asc").string());
+  put("file = \"house.obj\"\nposition = [18, 24, 0]", "name = \"ram\"\nbox = [3, 3, 3]\nmotion = \"linear\"");
+  put("[skin]", "[[obstacle.key]]\ntime = 0\nposition = [18, 20, 0]\n[[obstacle.key]]\ntime = 0.3\nposition = [18, 43, 0]\n[[obstacle.key]]\ntime = 0.6\nposition = [18, 48, 0]\n\n[skin]");
+  const fs::path out = folder_ / "ram";
+  const Arguments base = {"run", write("scene.toml", text), "-o", out, "--frames", "24", "--set", "film.time_scale=1", "--set", "lava.spacing=0.8 m", "--set", "preview.pictures=false", "--set", "output.formats=[\"ply\"]"};
+  Arguments coarse = base;
+  coarse.insert(coarse.end(), {"--set", "lava.min_step=0.02"});
+  const Outcome run = effuse(coarse);
+  EXPECT_EQ(run.code, 4) << run.err;
+  EXPECT_NE(run.err.find("obstacle 'ram', "), std::string::npos) << run.err;
+  EXPECT_NE(run.err.find("the open vent at 18, 43"), std::string::npos) << run.err;
+  // With steps as short as it takes it goes on, and says what became of the particles.
+  Arguments again = base;
+  again.push_back("--force");
+  EXPECT_EQ(effuse(again).code, 0);
+  EXPECT_NE(read_file(out / "flow.csv").find(",left_J,crushed,stopped\n"), std::string::npos) << read_file(out / "flow.csv").substr(0, 400);
+  EXPECT_TRUE(run_json(out)["effects"]["lava"].contains("crushed"));
+}
+
 TEST_F(ProgramTest, NamesTheNearestVerbAndRefusesAnUnknownFlag) {
   const Outcome verb = effuse({"chekc", "x.toml"});
   EXPECT_EQ(verb.code, 2);
@@ -592,7 +674,9 @@ TEST_F(ProgramTest, GoesOnWithoutAnybodyWhoListens) {
 
 TEST_F(ProgramTest, TakesNamesThatAreNotUtf8) {
   fs::copy_file(kScenes / "gully.asc", folder_ / "gully.asc");
-  write("gully.prj", "PROJCS[\"R\xe9union\",GEOGCS[\"x\"],UNIT[\"metre\",1]]");
+  write("gully.prj",
+        "PROJCS[\"R\xe9union\",GEOGCS[\"x\",DATUM[\"y\",SPHEROID[\"z\",6378137,298.257223563]],PRIMEM[\"Greenwich\",0],UNIT[\"Degree\",0.0174532925199433]],PROJECTION[\"Transverse_Mercator\"],"
+        "PARAMETER[\"False_Easting\",160000],PARAMETER[\"False_Northing\",50000],PARAMETER[\"Central_Meridian\",55.5],PARAMETER[\"Scale_Factor\",1],PARAMETER[\"Latitude_Of_Origin\",-21],UNIT[\"Meter\",1]]");
   const fs::path scene = write("sc\xe8ne.toml", "name = \"\xf0\x9f\x8c\x8b \\n \\u0000\"\n" + read_file(kScenes / "lava.toml").substr(read_file(kScenes / "lava.toml").find("\n[film]")));
   const fs::path out = folder_ / "\xe9t\xe9";
   const Outcome outcome = effuse({"run", scene, "-o", out, "--frames", "2", "--set", "lava.spacing=1.2 m", "--set", "preview.pictures=false", "--json"});

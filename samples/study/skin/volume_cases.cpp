@@ -12,6 +12,7 @@
 #include "geometry/base/error.h"
 #include "importers/scene/scene_file.h"
 #include "importers/terrain/import_terrain.h"
+#include "samples/effuse/terrain_options.h"
 #include "samples/study/skin/cases.h"
 #include "samples/study/skin/soundness.h"
 
@@ -38,7 +39,7 @@ class MountainFlow {
     flow::Parameters root(root_);
     scene_ = flow::read_scene(root, flow::effect_kinds());
     if (!root.faults().empty()) throw InputError(root.faults());
-    terrain_ = importers::import_terrain(file.parent_path() / scene_.terrain_file, {scene_.ground_temperature, scene_.terrain_crs}).terrain;
+    terrain_ = importers::import_terrain(file.parent_path() / scene_.terrain.files.at(0), terrain_options(scene_.terrain)).terrain;
     simulation_ = std::make_unique<flow::Simulation>(scene_, flow::World{&*terrain_, scene_.seed});
   }
   bool advance() { return simulation_->frame() < scene_.frames && simulation_->advance([] { return true; }); }

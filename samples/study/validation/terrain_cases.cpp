@@ -15,6 +15,7 @@
 #include "geometry/base/units.h"
 #include "importers/scene/scene_file.h"
 #include "importers/terrain/import_terrain.h"
+#include "samples/effuse/terrain_options.h"
 #include "samples/study/study.h"
 #include "samples/study/validation/setups.h"
 
@@ -44,7 +45,7 @@ std::unique_ptr<Loaded> load(const fs::path& file, const std::vector<std::string
   if (!root.faults().empty()) throw InputError(root.faults());
   const flow::Scene& scene = loaded->scene;
   loaded->terrain =
-      importers::import_terrain(file.parent_path() / scene.terrain_file, {scene.ground_temperature, scene.terrain_crs}).terrain;
+      importers::import_terrain(file.parent_path() / scene.terrain.files.at(0), terrain_options(scene.terrain)).terrain;
   loaded->simulation = std::make_unique<flow::Simulation>(scene, flow::World{&*loaded->terrain, scene.seed});
   return loaded;
 }

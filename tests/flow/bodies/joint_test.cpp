@@ -121,6 +121,32 @@ TEST(Joints, AHeavyBallOnALightChainHangsStill) {
   EXPECT_LT(world.kinetic_energy(), 1e-6);
 }
 
+TEST(Joints, ALightChainHoldsWhenAHeavyBallJerksIt) {
+  // 12 links of 84 kg, a ball of 24 t: thrown up, so that the chain goes slack and the ball falls into it; or swung into a stack.
+  for (const bool stack : {false, true}) {
+    RigidBodies world(worlds::awake(), stack ? std::optional(worlds::plane()) : std::nullopt);
+    const Real top = stack ? 8 : 0;
+    const auto link = Shape::box(Vec3(0.07, 0.07, 0.275));
+    BodyId last = Joint::kWorld;
+    for (int k = 0; k < 12; ++k) {
+      const BodyId next = world.add(link, 7800, at(0, 0, top - 0.25 - 0.5 * k));
+      world.join(make(Kind::kBall, last, next, Vec3(0, 0, top - 0.5 * k)));
+      last = next;
+    }
+    const BodyId ball = world.add(Shape::sphere(0.9), 7800, at(0, 0, top - 6.9), {}, stack ? Vec3(9, 0.5, 0) : Vec3(5, 0, 9));
+    world.join(make(Kind::kFixed, last, ball, Vec3(0, 0, top - 6)));
+    const auto block = Shape::box(Vec3::Constant(0.4));
+    for (int k = 0; stack && k < 15; ++k) world.add(block, 2000, at(2.5, 0.85 * (k / 5 - 1), 0.4 + 0.8 * (k % 5)));
+    Real error = 0;
+    const Real E = worlds::energy(world);
+    for (int k = 0; k < 5 * 120; ++k) {
+      error = std::max(error, world.step(1.0 / 120).joint_error);
+    }
+    EXPECT_LT(error, 1e-3 * 0.5) << "of a link's length";
+    EXPECT_LT(worlds::energy(world), E) << "a jerk takes energy, it gives none";
+  }
+}
+
 TEST(Joints, OfEveryKindLeaveTheFreedomTheyNameAndNoOther) {
   for (const Kind kind : {Kind::kBall, Kind::kHinge, Kind::kSlider, Kind::kFixed, Kind::kDistance}) {
     SCOPED_TRACE(kJointNames[static_cast<int>(kind)]);

@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "skin/color/lava_color.h"
+#include "skin/write/write_animation.h"
 #include "skin/write/write_mesh.h"
 #include "tests/skin/sample_lava.h"
 
@@ -45,6 +46,18 @@ class GltfValidatorSlow : public testing::Test {
   void TearDown() override { fs::remove_all(folder_); }
   fs::path folder_;
 };
+
+TEST_F(GltfValidatorSlow, ThingsThatMoveHaveNoErrorsAndNoWarnings) {
+  geometry::TriMesh ring = testing_meshes::tube(60, 3, 10, 12);
+  color_lava(ring);
+  const geometry::RigidPose here{Vec3(1, 2, 3), Quat::Identity()}, there{Vec3(4, 2, 3), Quat(0.6, 0, 0.8, 0)};
+  const std::vector<Real> times = {0, 0.5, 1};
+  write_animated_glb(folder_ / "moving.glb", std::vector<MovingMesh>{{"a", &ring, {here, there, here}}, {"b", &ring, {there, there, there}}}, times);
+  write_animated_glb(folder_ / "still.glb", std::vector<MovingMesh>{{"b", &ring, {there}}}, std::vector<Real>{0});
+  write_animated_glb(folder_ / "none.glb", {}, times);
+  const Outcome outcome = validate_gltf({folder_ / "moving.glb", folder_ / "still.glb", folder_ / "none.glb"});
+  EXPECT_EQ(outcome.code, 0) << outcome.text;
+}
 
 TEST_F(GltfValidatorSlow, LavaTerrainAndEmptyFramesHaveNoErrorsAndNoWarnings) {
   geometry::TriMesh lava = testing_meshes::tube(60, 3, 40, 12);

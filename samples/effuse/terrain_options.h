@@ -1,0 +1,28 @@
+#pragma once
+
+#include "flow/scene/terrain_settings.h"
+#include "importers/terrain/import_terrain.h"
+
+namespace effuse {
+
+/// How the importers are to read the ground of a scene.
+inline importers::TerrainImportOptions terrain_options(const flow::TerrainSettings& s) {
+  importers::TerrainImportOptions options;
+  options.temperature = s.temperature;
+  importers::DemOptions& dem = options.dem;
+  dem.crs = s.crs;
+  dem.file_crs = s.file_crs;
+  dem.crop = s.crop;
+  dem.spacing = s.spacing;
+  // Both lists have the same names in the same order.
+  dem.resampling = static_cast<importers::Resampling>(s.resample);
+  dem.holes = static_cast<importers::HolePolicy>(s.holes);
+  dem.pits = static_cast<importers::PitPolicy>(s.pits);
+  dem.vertical_unit = s.vertical_unit;
+  dem.pit_depth = s.pit_depth;
+  dem.size = s.size;
+  dem.range = s.range;
+  return options;
+}
+
+}  // namespace effuse
