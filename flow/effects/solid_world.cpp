@@ -1,6 +1,9 @@
 #include "flow/effects/solid_world.h"
 
+#include <algorithm>
+
 #include "geometry/base/check.h"
+#include "geometry/mesh/mass_properties.h"
 
 namespace effuse::flow {
 
@@ -11,12 +14,20 @@ using geometry::RigidMotion;
 using geometry::RigidPose;
 using sph::Movable;
 
+namespace {
+/// Of the shape's solids [m^3]; 0: it is, or has parts that are, open.
+Real solid_volume(const geometry::CollisionMesh& shape) {
+  return shape.solid() ? std::max(geometry::mass_properties(shape.mesh()).volume, 0.0) : 0;
+}
+}  // namespace
+
 SolidWorld::SolidWorld(const std::vector<PlacedObstacle>& obstacles, const std::vector<PlacedBody>& bodies, const geometry::Terrain* terrain, const bodies::BodyOptions& options)
-    : friction_(1, 1.0) {
+    : friction_(1, 1.0), effusivity_(1, 0.0) {
   for (const PlacedObstacle& each : obstacles) {
     tracks_.push_back(each.track);
     friction_.push_back(each.friction);
     obstacles_.add({each.shape, RigidMotion(each.track.at(0)), each.temperature, static_cast<Index>(tracks_.size())});
+    add_heat(each.name, each.material, each.temperature, solid_volume(each.shape));
   }
   if (!bodies.empty()) {
     bodies_ = std::make_unique<RigidBodies>(options, terrain ? std::optional(*terrain) : std::nullopt);
@@ -31,10 +42,34 @@ SolidWorld::SolidWorld(const std::vector<PlacedObstacle>& obstacles, const std::
       const geometry::CollisionMesh mesh = shape->kind() == Shape::Kind::kMesh ? shape->collision_mesh() : geometry::CollisionMesh(shape->surface());
       obstacles_.add({mesh, RigidMotion(bodies_->body_pose(ids_.back())), each.temperature, static_cast<Index>(tracks_.size() + ids_.size())});
       before_.push_back(bodies_->body_pose(ids_.back()));
+      add_heat(each.name, each.material, each.temperature, bodies_->mass(ids_.back()) / each.density);
     }
     acceleration_.assign(ids_.size(), options.gravity);
   }
   obstacles_.update();
+}
+
+void SolidWorld::add_heat(std::string name, const Material& material, Real temperature, Real volume) {
+  names_.push_back(std::move(name));
+  effusivity_.push_back(material.effusivity());
+  first_temperature_.push_back(temperature);
+  capacity_.push_back(material.conductivity > 0 && temperature > 0 ? material.density * material.heat_capacity * volume : 0);
+  warmth_.push_back({0, 0, capacity_.back() > 0 ? temperature : 0});
+}
+
+void SolidWorld::warm(std::span<const Real> heat, std::span<const Real> hottest) {
+  for (std::size_t k = 0; k < warmth_.size() && k + 1 < heat.size(); ++k) {
+    if (heat[k + 1] == 0 && hottest[k + 1] == 0) continue;
+    warmth_[k].given += heat[k + 1];
+    warmth_[k].hottest = std::max(warmth_[k].hottest, hottest[k + 1]);
+    set_mean(k);
+  }
+}
+
+void SolidWorld::set_mean(std::size_t k) {
+  if (capacity_[k] <= 0) return;
+  warmth_[k].mean = first_temperature_[k] + warmth_[k].given / capacity_[k];
+  obstacles_.set_temperature(k, warmth_[k].mean);
 }
 
 void SolidWorld::go(std::size_t i, const RigidMotion& motion) {
@@ -103,6 +138,8 @@ void SolidWorld::take(std::span<const Movable> movable, Real dt) {
 sph::SolidOptions SolidWorld::solids() {
   if (obstacles_.empty()) return {};
   sph::SolidOptions options{&obstacles_, {}, friction_};
+  options.effusivity = effusivity_;
+  options.heated = [this](std::span<const Real> heat, std::span<const Real> hottest) { warm(heat, hottest); };
   bool moves = has_bodies();
   for (const geometry::PoseTrack& track : tracks_) moves = moves || track.keys().size() > 1;
   if (moves) {
@@ -127,18 +164,27 @@ std::vector<RigidPose> SolidWorld::poses() const {
 Vec3 SolidWorld::velocity(std::size_t body) const { return bodies_->momenta()[ids_[body]] / bodies_->mass(ids_[body]); }
 
 void SolidWorld::add_to(StateHash& hash) const {
+  for (const Warmth& each : warmth_) hash.add(std::span<const Real>(&each.given, 1));
   if (!has_bodies()) return;
   bodies_->add_to(hash);
   hash.add(std::span<const Vec3>(acceleration_));
 }
 
 void SolidWorld::save(StateWriter& out) const {
+  if (!warmth_.empty()) out.array("warmth", warmth_);
   if (!has_bodies()) return;
   bodies_->save(out);
   out.array("body_acceleration", acceleration_);
 }
 
 void SolidWorld::load(StateReader& in) {
+  if (!warmth_.empty()) {
+    std::vector<Warmth> warmth;
+    in.array("warmth", warmth);
+    if (warmth.size() != warmth_.size()) throw InputError(Place{}, "the checkpoint holds other obstacles");
+    warmth_ = std::move(warmth);
+    for (std::size_t k = 0; k < warmth_.size(); ++k) set_mean(k);
+  }
   if (!has_bodies()) return;
   bodies_->load(in);
   std::vector<Vec3> acceleration;

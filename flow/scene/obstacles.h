@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "flow/scene/material.h"
 #include "flow/scene/parameters.h"
 #include "geometry/collide/collision_mesh.h"
 #include "geometry/motion/pose_track.h"
@@ -22,6 +23,7 @@ struct PlannedObstacle {
   geometry::KeyMotion motion = geometry::KeyMotion::kSmooth;
   Real temperature = 0;  ///< of its surface [K]; 0: the ground's
   Real friction = 1;     ///< of lava on it: 1 no slip, 0 free slip
+  Material material;
 };
 
 /// The tables [[obstacle]] of a scene, each with its [[obstacle.key]]s. Faults stay in root.
@@ -34,6 +36,7 @@ struct PlacedObstacle {
   geometry::PoseTrack track;
   Real temperature = 0;
   Real friction = 1;
+  Material material = {};
 };
 
 /// The mesh of a plan's file, put on its terrain. What does not fit (no ground under it, times that do not rise, a mesh that is

@@ -36,6 +36,7 @@ std::vector<PlannedBody> read_bodies(Parameters& root) {
     plan.restitution = p.number("restitution", "", plan.restitution, {0, 1}, "of the speed of an impact that is given back");
     plan.temperature = p.number("temperature", "K", plan.temperature, {0, 5000}, "of its surface; 0: the ground's");
     plan.lava_friction = p.number("lava_friction", "", plan.lava_friction, {0, 1}, "of lava on it: 1 no slip, 0 free slip");
+    plan.material = read_material(p, plan.density > 0 ? plan.density : 1);
     plans.push_back(std::move(plan));
   }
   return plans;
@@ -53,6 +54,7 @@ void place_body(const PlannedBody& plan, geometry::TriMesh mesh, const geometry:
   body.spin = plan.spin;
   body.temperature = plan.temperature;
   body.lava_friction = plan.lava_friction;
+  body.material = plan.material;
   if (!put_on_terrain(body.pose, plan.on_ground, terrain, fmt::format("body '{}'", plan.name), plan.place, faults)) return;
   body.mesh = upright(std::move(mesh), plan.scale, plan.y_up);
   if (too_large(body.mesh, fmt::format("body '{}'", plan.name), plan.file_place, faults)) return;

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "flow/scene/material.h"
 #include "flow/scene/parameters.h"
 #include "geometry/collide/rigid_pose.h"
 #include "geometry/mesh/tri_mesh.h"
@@ -25,6 +26,7 @@ struct PlannedBody {
   Real friction = 0.5, restitution = 0;  ///< against bodies, obstacles and the ground
   Real temperature = 0;   ///< [K]; 0: the ground's
   Real lava_friction = 1; ///< of lava on it: 1 no slip, 0 free slip
+  Material material;
 };
 
 /// The tables [[body]] of a scene. Faults stay in root.
@@ -42,6 +44,7 @@ struct PlacedBody {
   Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();
   Real temperature = 0;
   Real lava_friction = 1;
+  Material material = {};
 };
 
 /// The mesh of a plan's file, put on its terrain. What does not fit is a fault at the plan's place; the body is then left out.
