@@ -49,6 +49,11 @@ class ModernLavaEffect final : public Effect {
       const Real area = static_cast<Real>(vent.lattice(options.spacing).size()) * options.spacing * options.spacing;
       openings_.push_back({vent.start, vent.stop, options.courant * options.spacing * area / vent.rate, vent.lattice(options.spacing), (vent.from + vent.to) / 2});
     }
+    // Several of one name: the second is name_2.
+    for (const std::string& name : solids_->names()) {
+      const auto taken = std::count(solids_->names().begin(), solids_->names().begin() + static_cast<std::ptrdiff_t>(figure_names_.size()), name);
+      figure_names_.push_back(taken > 0 ? fmt::format("{}_{}", name, taken + 1) : name);
+    }
   }
 
   std::string_view name() const override { return "lava"; }
@@ -143,6 +148,13 @@ class ModernLavaEffect final : public Effect {
                                        {"stored_J", t.stored},
                                        {"left_J", t.left}})
         figures.emplace_back(key, value);
+      for (std::size_t k = 0; k < solids_->names().size(); ++k) {
+        const SolidWorld::Warmth& warmth = solids_->warmth()[k];
+        const std::string& name = figure_names_[k];
+        figures.emplace_back(name + "_given_J", warmth.given);
+        figures.emplace_back(name + "_hottest_K", warmth.hottest);
+        if (warmth.mean > 0) figures.emplace_back(name + "_mean_K", warmth.mean);
+      }
     }
     if (solids_->any()) {
       figures.emplace_back("crushed", t.crushed);
@@ -257,6 +269,7 @@ class ModernLavaEffect final : public Effect {
   geometry::Terrain terrain_;
   std::optional<CrustBlocks> blocks_;
   std::vector<Opening> openings_;
+  std::vector<std::string> figure_names_;  // of obstacles and bodies
   ModernReport last_;
   Totals totals_;
 };

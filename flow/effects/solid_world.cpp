@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "geometry/base/check.h"
+#include "geometry/mesh/mass_properties.h"
 
 namespace effuse::flow {
 
@@ -30,6 +31,11 @@ bodies::BodyOptions body_options(const BodySettings& s) {
 }
 
 namespace {
+
+/// Of the shape's solids [m^3]; 0: it is, or has parts that are, open.
+Real solid_volume(const geometry::CollisionMesh& shape) {
+  return shape.solid() ? std::max(geometry::mass_properties(shape.mesh()).volume, 0.0) : 0;
+}
 
 static_assert(std::equal(std::begin(bodies::kJointNames), std::end(bodies::kJointNames), kJointKindNames.begin(), kJointKindNames.end()));
 
@@ -58,12 +64,13 @@ bodies::Joint joint_of(const PlacedJoint& placed, BodyId a, BodyId b) {
 
 SolidWorld::SolidWorld(const std::vector<PlacedObstacle>& obstacles, const std::vector<PlacedBody>& bodies, const geometry::Terrain* terrain, const bodies::BodyOptions& options,
                        const std::vector<PlacedJoint>& joints, bool births)
-    : friction_(1, 1.0) {
+    : friction_(1, 1.0), effusivity_(1, 0.0) {
   for (const PlacedObstacle& each : obstacles) {
     names_.push_back(fmt::format("obstacle '{}'", each.name));
     tracks_.push_back(each.track);
     friction_.push_back(each.friction);
     obstacles_.add({each.shape, RigidMotion(each.track.at(0)), each.temperature, static_cast<Index>(tracks_.size())});
+    add_heat(each.name, each.material, each.temperature, solid_volume(each.shape));
   }
   if (!bodies.empty() || births) {
     bodies_ = std::make_unique<RigidBodies>(options, terrain ? std::optional(*terrain) : std::nullopt);
@@ -88,11 +95,13 @@ SolidWorld::SolidWorld(const std::vector<PlacedObstacle>& obstacles, const std::
       if (each.cells) {
         if (!brittle_) brittle_ = std::make_unique<bodies::BrittleBodies>(*bodies_);
         admit(brittle_->add({each.cells, each.strength, each.smallest}, each.density, each.pose, touch, each.velocity, each.spin), static_cast<Index>(b));
+        add_heat(each.name, each.material, each.temperature, 0);  // its pieces come and go: what they are given is told, they stay as warm as they are
         continue;
       }
       ids_.push_back(bodies_->add(shape, each.density, each.pose, touch, each.velocity, each.spin));
       obstacles_.add({*mesh, RigidMotion(bodies_->body_pose(ids_.back())), each.temperature, static_cast<Index>(tracks_.size() + ids_.size())});
       before_.push_back(bodies_->body_pose(ids_.back()));
+      add_heat(each.name, each.material, each.temperature, bodies_->mass(ids_.back()) / each.density);
     }
     of_scene_ = ids_.size();
     wet_.resize(ids_.size());
@@ -101,6 +110,29 @@ SolidWorld::SolidWorld(const std::vector<PlacedObstacle>& obstacles, const std::
     for (const PlacedJoint& each : joints) bodies_->join(joint_of(each, end(each.ends[0]), end(each.ends[1])));
   }
   obstacles_.update();
+}
+
+void SolidWorld::add_heat(std::string name, const Material& material, Real temperature, Real volume) {
+  heated_names_.push_back(std::move(name));
+  effusivity_.push_back(material.effusivity());
+  first_temperature_.push_back(temperature);
+  capacity_.push_back(material.conductivity > 0 && temperature > 0 ? material.density * material.heat_capacity * volume : 0);
+  warmth_.push_back({0, 0, capacity_.back() > 0 ? temperature : 0});
+}
+
+void SolidWorld::warm(std::span<const Real> heat, std::span<const Real> hottest) {
+  for (std::size_t k = 0; k < warmth_.size() && k + 1 < heat.size(); ++k) {
+    if (heat[k + 1] == 0 && hottest[k + 1] == 0) continue;
+    warmth_[k].given += heat[k + 1];
+    warmth_[k].hottest = std::max(warmth_[k].hottest, hottest[k + 1]);
+    set_mean(k);
+  }
+}
+
+void SolidWorld::set_mean(std::size_t k) {
+  if (capacity_[k] <= 0) return;
+  warmth_[k].mean = first_temperature_[k] + warmth_[k].given / capacity_[k];
+  obstacles_.set_temperature(k, warmth_[k].mean);
 }
 
 void SolidWorld::go(std::size_t i, const RigidMotion& motion) {
@@ -235,6 +267,8 @@ sph::SolidOptions SolidWorld::solids() {
   if (obstacles_.empty() && !has_bodies()) return {};
   sph::SolidOptions options{&obstacles_, {}, friction_};
   if (has_bodies()) options.friction_by = [this](Index surface) { return surface < friction_.size() ? friction_[surface] : 1; };
+  options.effusivity = effusivity_;
+  options.heated = [this](std::span<const Real> heat, std::span<const Real> hottest) { warm(heat, hottest); };
   bool moves = has_bodies();
   for (const geometry::PoseTrack& track : tracks_) moves = moves || track.keys().size() > 1;
   if (moves) {
@@ -259,7 +293,7 @@ std::vector<RigidPose> SolidWorld::poses() const {
 std::optional<SolidWorld::Near> SolidWorld::nearest(const Vec3& point, Real reach) const {
   geometry::Contact found;
   if (obstacles_.contacts(point, reach, std::span(&found, 1)) == 0) return std::nullopt;
-  return Near{names_.at(found.surface - 1), found.distance, found.surface_velocity.norm()};
+  return Near{found.surface <= names_.size() ? names_[found.surface - 1] : "a piece that broke off", found.distance, found.surface_velocity.norm()};
 }
 
 std::size_t SolidWorld::count() const {
@@ -271,6 +305,7 @@ std::size_t SolidWorld::count() const {
 Vec3 SolidWorld::velocity(std::size_t body) const { return bodies_->momenta()[ids_[body]] / bodies_->mass(ids_[body]); }
 
 void SolidWorld::add_to(StateHash& hash) const {
+  for (const Warmth& each : warmth_) hash.add(std::span<const Real>(&each.given, 1));
   if (!has_bodies()) return;
   bodies_->add_to(hash);
   if (brittle_) brittle_->add_to(hash);
@@ -278,6 +313,7 @@ void SolidWorld::add_to(StateHash& hash) const {
 }
 
 void SolidWorld::save(StateWriter& out) const {
+  if (!warmth_.empty()) out.array("warmth", warmth_);
   if (!has_bodies()) return;
   std::vector<Index> block_ids, block_corners;
   std::vector<Vec3> corners;
@@ -312,6 +348,13 @@ void SolidWorld::save(StateWriter& out) const {
 }
 
 void SolidWorld::load(StateReader& in) {
+  if (!warmth_.empty()) {
+    std::vector<Warmth> warmth;
+    in.array("warmth", warmth);
+    if (warmth.size() != warmth_.size()) throw InputError(Place{}, "the checkpoint holds other obstacles");
+    warmth_ = std::move(warmth);
+    for (std::size_t k = 0; k < warmth_.size(); ++k) set_mean(k);
+  }
   if (!has_bodies()) return;
   const auto refuse = [] { throw InputError(Place{}, "the checkpoint holds other rigid bodies"); };
   std::vector<Index> block_ids, block_corners;

@@ -25,6 +25,9 @@ bodies::BodyOptions body_options(const BodySettings& settings);
 /// as long, with gravity and their contacts. Momentum is kept, to the tolerance of the viscosity's solve.
 ///
 /// What a body rests on is known to the lava by how it held the body up in the step before (Movable::acceleration).
+/// A thing with a material of its own takes up heat as a half-space where lava touches it (sph::Heat), beginning from the temperature that
+/// the whole has by then: that rises by what it was given over its heat capacity, so that it never grows hotter than the lava. Of an
+/// obstacle that is no solid, or has no temperature of its own, it stays.
 /// Surfaces are numbered from 1: obstacles, then bodies, in their order, then pieces of those that break as they come. Numbers of
 /// bodies that are gone are not given again. Not to be moved while a lava refers to it.
 ///
@@ -77,6 +80,17 @@ class SolidWorld {
   std::vector<std::pair<std::string, double>> figures() const;
   const bodies::BodyReport& last() const { return last_; }
 
+  /// What lava has done to a thing's heat.
+  ///   given    [J] in all
+  ///   hottest  [K] that its surface has been where lava touched it; 0: never touched
+  ///   mean     [K] of the whole: where it began and what it was given; 0: it has no temperature, or no heat capacity, of its own
+  struct Warmth {
+    Real given = 0, hottest = 0, mean = 0;
+  };
+  /// Obstacles, then the scene's bodies; and what they are called.
+  const std::vector<Warmth>& warmth() const { return warmth_; }
+  const std::vector<std::string>& names() const { return heated_names_; }
+
   void add_to(StateHash& hash) const;
   void save(StateWriter& out) const;
   void load(StateReader& in);
@@ -100,6 +114,9 @@ class SolidWorld {
   bool gone(std::size_t body) const { return bodies_->is_gone(ids_[body]); }
   template <class Self, class Archive>
   static void archive(Self& self, Archive& io);
+  void add_heat(std::string name, const Material& material, Real temperature, Real volume);
+  void set_mean(std::size_t thing);
+  void warm(std::span<const Real> heat, std::span<const Real> hottest);
 
   std::vector<std::string> names_;       // obstacles', then bodies'
   std::vector<geometry::PoseTrack> tracks_;
@@ -110,7 +127,11 @@ class SolidWorld {
   std::vector<Real> temperature_;
   std::vector<std::shared_ptr<const geometry::TriMesh>> look_;  // of those that may break
   std::vector<std::vector<Vec3>> wet_;   // places of lava on them, in their frames
-  std::vector<Real> friction_;
+  std::vector<Real> friction_, effusivity_;  // by surface
+  std::vector<std::string> heated_names_;    // of obstacles, then bodies of the scene, and so on
+  std::vector<Warmth> warmth_;
+  std::vector<Real> capacity_;               // [J/K]; 0: stays as warm as it is
+  std::vector<Real> first_temperature_;      // [K]
   std::vector<Vec3> acceleration_;       // of bodies, by all but lava, in the last step [m/s^2]
   std::vector<geometry::RigidPose> before_;  // body axes at the last step's begin
   Real last_dt_ = 0, time_ = 0;

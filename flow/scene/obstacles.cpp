@@ -19,6 +19,7 @@ std::vector<PlannedObstacle> read_obstacles(Parameters& root) {
     plan.on_ground = p.flag("on_ground", plan.on_ground, "heights count from the terrain at x, y");
     plan.temperature = p.number("temperature", "K", plan.temperature, {0, 5000}, "of its surface; 0: the ground's");
     plan.friction = p.number("friction", "", plan.friction, {0, 1}, "of lava on it: 1 no slip, 0 free slip");
+    plan.material = read_material(p);
     plan.motion = static_cast<geometry::KeyMotion>(
         p.choice("motion", {geometry::kKeyMotionNames.begin(), geometry::kKeyMotionNames.end()}, static_cast<std::size_t>(plan.motion), "from key to key"));
     std::vector<Parameters> keys = p.tables("key", "where it is at a time; before the first and after the last it stands");
@@ -52,7 +53,7 @@ void place_obstacle(const PlannedObstacle& plan, geometry::TriMesh mesh, const g
   mesh = upright(std::move(mesh), plan.scale, plan.y_up);
   if (too_large(mesh, fmt::format("obstacle '{}'", plan.name), plan.file_place, faults)) return;
   try {
-    placed.push_back({plan.name, geometry::CollisionMesh(mesh), geometry::PoseTrack(std::move(keys), plan.motion), plan.temperature, plan.friction, plan.color});
+    placed.push_back({plan.name, geometry::CollisionMesh(mesh), geometry::PoseTrack(std::move(keys), plan.motion), plan.temperature, plan.friction, plan.color, plan.material});
   } catch (const InputError& error) {
     for (const Fault& fault : error.faults()) faults.push_back({plan.file_place, fmt::format("obstacle '{}': {}", plan.name, fault.message)});
   }

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "flow/scene/material.h"
 #include "flow/scene/parameters.h"
 #include "flow/scene/placing.h"
 #include "geometry/collide/collision_mesh.h"
@@ -18,6 +19,7 @@ struct PlannedObstacle : PlannedForm {
   geometry::KeyMotion motion = geometry::KeyMotion::kSmooth;
   Real temperature = 0;  ///< of its surface [K]; 0: the ground's
   Real friction = 1;     ///< of lava on it: 1 no slip, 0 free slip
+  Material material;
 };
 
 /// The tables [[obstacle]] of a scene, each with its [[obstacle.key]]s. Faults stay in root.
@@ -31,6 +33,7 @@ struct PlacedObstacle {
   Real temperature = 0;
   Real friction = 1;
   Vec3 color = Vec3::Constant(-1);  ///< as PlannedForm has it
+  Material material = {};
 };
 
 /// The mesh of a plan's file, put on its terrain. What does not fit (no ground under it, times that do not rise, a mesh that is

@@ -37,6 +37,7 @@ std::vector<PlannedBody> read_bodies(Parameters& root, std::uint64_t seed) {
     plan.rolling = p.number("rolling", "m", plan.rolling, Parameters::not_negative(), "lever arm of its resistance to rolling");
     plan.temperature = p.number("temperature", "K", plan.temperature, {0, 5000}, "of its surface; 0: the ground's");
     plan.lava_friction = p.number("lava_friction", "", plan.lava_friction, {0, 1}, "of lava on it: 1 no slip, 0 free slip");
+    plan.material = read_material(p, plan.density > 0 ? plan.density : 1);
     plan.breaking = read_breaking(p, seed);
     const auto copies = p.integer("copies", 1, 1, kMostCopies, "so many of it, called name.1, name.2, ...");
     const Vec3 step = vector("step", "m", "from one copy to the next");
@@ -87,6 +88,7 @@ void place_body(const PlannedBody& plan, geometry::TriMesh mesh, const geometry:
   body.spin = plan.spin;
   body.temperature = plan.temperature;
   body.lava_friction = plan.lava_friction;
+  body.material = plan.material;
   // One that breaks has flat faces.
   if (plan.breaking.breaks()) body.ball = 0;
   if (!put_on_terrain(body.pose, plan.on_ground, terrain, fmt::format("body '{}'", plan.name), plan.place, faults)) return;

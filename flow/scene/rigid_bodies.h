@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "flow/scene/breaking.h"
+#include "flow/scene/material.h"
 #include "flow/scene/parameters.h"
 #include "flow/scene/placing.h"
 #include "geometry/collide/rigid_pose.h"
@@ -24,6 +25,7 @@ struct PlannedBody : PlannedForm {
   Real temperature = 0;   ///< [K]; 0: the ground's
   Real lava_friction = 1; ///< of lava on it: 1 no slip, 0 free slip
   PlannedBreaking breaking;
+  Material material;
 };
 
 /// The tables [[body]] of a scene; one with copies = n stands for n bodies, name.1 to name.n, each a `step` further. Faults stay in root.
@@ -46,6 +48,7 @@ struct PlacedBody {
   Vec3 color = Vec3::Constant(-1);  ///< as PlannedForm has it
   std::shared_ptr<const geometry::FracturedBody> cells;  ///< of one that may break: of the hull, where that stands for it; null: it does not
   Real strength = 0, smallest = 0;  ///< [Pa], [m^3]
+  Material material = {};
 };
 
 /// How bodies of a scene are stepped, by its table [bodies].

@@ -17,13 +17,15 @@ FilmFriction::FilmFriction(const BoundaryTable& table, Real spacing) : spacing_(
       }
     }
   }
-  for (std::size_t layers = 1; layers <= kLayers; ++layers) {
+  // The factor at which `layers` of them, on one wall or between two, let through so much.
+  const auto factor_for = [&](std::size_t layers, bool channel, Real exact) {
     const int n = static_cast<int>(layers);
     Eigen::MatrixXd inside = Eigen::MatrixXd::Zero(n, n);
-    Eigen::VectorXd wall(n);
+    Eigen::VectorXd wall = Eigen::VectorXd::Zero(n);
     for (int k = 0; k < n; ++k) {
-      const Real d = (k + 0.5) * spacing;
-      wall[k] = d < table.support() ? table.at(d).drag_t / d * spacing * spacing : 0;
+      const auto drag = [&](Real d) { return d < table.support() ? table.at(d).drag_t / d * spacing * spacing : 0; };
+      wall[k] = drag((k + 0.5) * spacing);
+      if (channel) wall[k] += drag((n - k - 0.5) * spacing);
       for (int l = std::max(0, k - reach); l <= std::min(n - 1, k + reach); ++l) {
         if (l == k) continue;
         inside(k, k) += pair[static_cast<std::size_t>(std::abs(l - k))];
@@ -31,7 +33,6 @@ FilmFriction::FilmFriction(const BoundaryTable& table, Real spacing) : spacing_(
       }
     }
     // Flux falls as the factor grows: bisection.
-    const Real exact = std::pow(static_cast<Real>(n), 3) / 3;
     Real low = 0.1, high = 10;
     for (int iteration = 0; iteration < 60; ++iteration) {
       const Real f = std::sqrt(low * high);
@@ -39,8 +40,10 @@ FilmFriction::FilmFriction(const BoundaryTable& table, Real spacing) : spacing_(
       const Real flux = matrix.partialPivLu().solve(Eigen::VectorXd::Ones(n)).sum();
       (flux > exact ? low : high) = f;
     }
-    factor_[layers - 1] = std::sqrt(low * high);
-  }
+    return std::sqrt(low * high);
+  };
+  for (std::size_t n = 1; n <= kFilmLayers; ++n) film_[n - 1] = factor_for(n, false, std::pow(static_cast<Real>(n), 3) / 3);
+  for (std::size_t n = 1; n <= kChannelLayers; ++n) channel_[n - 1] = factor_for(n, true, std::pow(static_cast<Real>(n), 3) / 12);
 }
 
 }  // namespace effuse::flow::sph

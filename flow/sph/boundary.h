@@ -13,6 +13,8 @@
 /// plane at a contact's distance. One table serves height fields, meshes and obstacles alike.
 namespace effuse::flow::sph {
 
+inline constexpr Real kNothingAcross = 1e9;  ///< [m]
+
 /// One surface that a particle feels.
 struct Wall {
   Vec3 normal = Vec3::UnitZ();     ///< out of the solid
@@ -22,7 +24,9 @@ struct Wall {
   Real curvature = 0;              ///< sum of both principal curvatures [1/m]; positive: convex ground
   Vec3 velocity = Vec3::Zero();    ///< of the surface [m/s]
   Real temperature = 0;            ///< [K]; 0: none of its own
+  Real effusivity = 0;             ///< sqrt(k rho c) of the solid [J/(m^2 K s^0.5)]; 0: the ground's
   Real friction = 1;               ///< factor of the drag along it: FilmFriction
+  Real across = kNothingAcross;    ///< to a wall face to face with it [m]: FilmFriction::channel(); only obstacles' walls know
   bool mirrors = false;            ///< the pressure goes on along it beyond it, as in a mirror: pressure.h
   Index movable = kNotMovable;     ///< place in ParticleSystem::movable; then `velocity` is not looked at
   Vec3 arm = Vec3::Zero();         ///< from its centre to the wall's place [m]
@@ -160,23 +164,33 @@ class BoundaryTable {
   std::vector<Row> row_;  // d from -support to support
 };
 
-/// What thin lava lacks of friction. The wall's drag is spread over the layers within the support; a film of fewer layers
-/// gets less of it, and flows too fast (one layer: twice). The factor f(H) that gives a film of depth H on a plane,
-/// particles on a cubic lattice, exactly the flux g sin(theta) H^3 / (3 nu) of Nusselt: solved layer by layer for
-/// N = 1..12 layers, linear in H / spacing between, constant outside.
+/// What thin lava lacks of friction. A wall's drag is spread over the layers within the support, and goes on linearly beyond the wall
+/// where the profile is a parabola; a film of few layers gets less of it, and flows too fast (one layer: twice), as does lava between two
+/// walls face to face. The factors that give, particles on a cubic lattice, exactly
+///
+///   film(H)     on a plane, the surface free: the flux g sin(theta) H^3 / (3 nu) of Nusselt
+///   channel(W)  between two walls, pushed along them: F W^3 / (12 nu) of Poiseuille
+///
+/// solved layer by layer for N = 1..12 and 1..16 layers, linear in H / spacing between, constant outside.
 class FilmFriction {
  public:
   FilmFriction(const BoundaryTable& table, Real spacing);
-  Real at(Real depth) const {
-    const Real s = std::clamp(depth / spacing_ - 1, 0.0, static_cast<Real>(kLayers - 1));
-    const auto k = std::min(static_cast<std::size_t>(s), kLayers - 2);
-    return factor_[k] + (s - static_cast<Real>(k)) * (factor_[k + 1] - factor_[k]);
-  }
+  Real film(Real depth) const { return at(film_, depth / spacing_); }
+  Real channel(Real width) const { return at(channel_, width / spacing_); }
+  /// Wider channels need no factor [m].
+  Real widest() const { return kChannelLayers * spacing_; }
 
  private:
-  static constexpr std::size_t kLayers = 12;
+  static constexpr std::size_t kFilmLayers = 12, kChannelLayers = 16;
+  template <std::size_t N>
+  static Real at(const std::array<Real, N>& factors, Real layers) {
+    const Real s = std::clamp(layers - 1, 0.0, static_cast<Real>(N - 1));
+    const auto k = std::min(static_cast<std::size_t>(s), N - 2);
+    return factors[k] + (s - static_cast<Real>(k)) * (factors[k + 1] - factors[k]);
+  }
   Real spacing_;
-  std::array<Real, kLayers> factor_{};
+  std::array<Real, kFilmLayers> film_{};
+  std::array<Real, kChannelLayers> channel_{};
 };
 
 }  // namespace effuse::flow::sph

@@ -17,6 +17,7 @@ namespace {
 constexpr std::size_t kGrain = 256;  // particles a thread takes at a time
 constexpr Real kUnseen = 1e9;   // depth of lava whose surface is far, in spacings
 constexpr Real kNearOff = 1.55;  // spacings below the free surface: nearer, its distance is sure
+constexpr Real kAcross = 0.7;    // cosine: nearer to straight across than this
 constexpr Real kFlat = 0.05;     // of a full neighbourhood's moment: with less there is no gradient in that direction
 constexpr Real kNearestWall = 0.25;  // spacings: nearer walls shear no harder
 constexpr Real kSameFace = 0.6;  // cosine between the normals of two places of one face
@@ -38,13 +39,52 @@ Real lattice_sum(KernelKind kernel, Real support, Real spacing) {
   });
 }
 
+namespace {
+/// Multiplies the walls' friction by what thin lava lacks of it.
+///   depth  of films [m], kUnseen where the particle sees none on that wall
+///   up     to the free surface, unit, of particles that are sure of it; 0 of others
+///   off    how far that is [m]
+void resist_thin_lava(const ParticleSystem& s, const FilmFriction& film, std::vector<Real>& depth, std::span<const Vec3> up, std::span<const Real> off, Walls& walls) {
+  // Those near a wall that do not see the surface hear of it from neighbours that do, and from those on the same wall that have heard.
+  std::vector<Real> told = depth;
+  for (int round = 0; round < 2; ++round) {
+    parallel_for(s.size(), [&](std::size_t i) {
+      const bool several = walls[i].size() > 1;
+      for (Index w = walls.first[i]; w < walls.first[i + 1]; ++w) {
+        const Wall& wall = walls.walls[w];
+        if (depth[w] != kUnseen || wall.across != kNothingAcross) continue;
+        Real sum = 0, seen = 0;
+        for (const Index j : (*s.neighbors)[i]) {
+          Real least = kUnseen;
+          for (Index k = walls.first[j]; k < walls.first[j + 1]; ++k) {
+            if ((several || walls[j].size() > 1) && walls.walls[k].normal.dot(wall.normal) < kSameFace) continue;
+            least = std::min(least, depth[k]);
+          }
+          if (least == kUnseen && walls[j].empty() && up[j].dot(wall.normal) > kAcross) least = wall.distance + s.separation<true>(j, static_cast<Index>(i)).dot(wall.normal) + off[j];
+          if (least == kUnseen) continue;
+          sum += least;
+          seen += 1;
+        }
+        if (seen > 0) told[w] = sum / seen;
+      }
+    });
+    depth = told;
+  }
+  parallel_for(walls.walls.size(), [&](std::size_t w) {
+    Wall& wall = walls.walls[w];
+    wall.friction *= depth[w] == kUnseen && wall.across != kNothingAcross ? film.channel(wall.across) : film.film(depth[w] == kUnseen ? kUnseen * s.spacing : depth[w]);
+  }, 4096);
+}
+}  // namespace
+
 void find_shape(const ParticleSystem& s, Real lattice, const FilmFriction& film, Walls& walls, FlowShape& shape) {
   ZONE("sph.density");
   const std::size_t n = s.size();
   const Real dx = s.spacing, face = dx * dx;
   for (auto* array : {&shape.density, &shape.off, &shape.missing, &shape.exposed, &shape.grounded}) array->resize(n);
   shape.surface.resize(n);
-  std::vector<Real> depth(n);
+  std::vector<Real> depth(walls.walls.size(), kUnseen);  // of the film on each wall [m]
+  std::vector<Vec3> up(n, Vec3::Zero());
   const auto share = [dx](Real distance) { return std::clamp(1.5 - distance / dx, 0.0, 1.0); };
 
   const Real own = with_kernel(s, [&](const auto& W, auto) { return s.volume() * W.W(0); });
@@ -81,33 +121,17 @@ void find_shape(const ParticleSystem& s, Real lattice, const FilmFriction& film,
       if (density < kLoose) exposed = std::max(exposed, kDrop * std::pow((1 - density) / (1 - alone), power));
       shape.exposed[i] = face * exposed;
 
-      // Depth of the film, where the free surface is near and across from the wall.
-      depth[i] = kUnseen;
-      if (off < kNearOff * dx)
-        for (const Wall& wall : walls[i])
-          if (slope.dot(wall.normal) < 0) depth[i] = std::min(depth[i], wall.distance + off);
+      // Depth of the film, where the free surface is near and across from the wall. To obstacles' walls, that stand beside films as often
+      // as under them, straight across.
+      if (!(off < kNearOff * dx)) continue;
+      up[i] = -slope.normalized();
+      for (Index w = walls.first[i]; w < walls.first[i + 1]; ++w) {
+        const Wall& wall = walls.walls[w];
+        if (slope.dot(wall.normal) < (wall.mirrors ? -kAcross * slope.norm() : 0)) depth[w] = wall.distance + off;
+      }
     }
   });
-
-  // Those near the wall that do not see the surface hear of it from neighbours, and these from theirs.
-  std::vector<Real> told = depth;
-  for (int round = 0; round < 2; ++round) {
-    parallel_for(n, [&](std::size_t i) {
-      if (walls.first[i] == walls.first[i + 1] || depth[i] != kUnseen) return;
-      Real sum = 0, seen = 0;
-      for (const Index j : (*s.neighbors)[i]) {
-        if (depth[j] == kUnseen) continue;
-        sum += depth[j];
-        seen += 1;
-      }
-      if (seen > 0) told[i] = sum / seen;
-    });
-    depth = told;
-  }
-  parallel_for(n, [&](std::size_t i) {
-    const Real friction = film.at(depth[i] == kUnseen ? kUnseen * dx : depth[i]);
-    for (Index w = walls.first[i]; w < walls.first[i + 1]; ++w) walls.walls[w].friction *= friction;
-  });
+  resist_thin_lava(s, film, depth, up, shape.off, walls);
 }
 
 void bend_walls(const ParticleSystem& s, Walls& walls, std::vector<Real>& distances) {

@@ -31,8 +31,8 @@ struct FlowShape {
 /// L = V sum W over a cubic lattice.
 Real lattice_sum(KernelKind kernel, Real support, Real spacing);
 
-/// Fills shape, and multiplies the friction of walls under thin lava: by `film` at the depth of the film, known where the free surface
-/// is near, or told by neighbours there.
+/// Fills shape, and multiplies the friction of walls at thin lava by `film`: at the depth of the film, where the free surface is near,
+/// straight across from an obstacle's wall, or told so by neighbours; or else at the width of the channel (Wall::across).
 void find_shape(const ParticleSystem& system, Real lattice, const FilmFriction& film, Walls& walls, FlowShape& shape);
 
 /// Adds to the walls' distances what the ground's curvature does to their half-space: the sum of the principal

@@ -146,10 +146,13 @@ HeatBudget Heat::step(Real dt, const Surroundings& s) {
   HeatBudget budget;
   const std::size_t n = size();
   CHECK(std::isfinite(dt) && dt >= 0);
+  given_.assign(n, 0);
+  touched_temperature_.assign(n, 0);
   if (!options_.on || n == 0 || dt == 0) return budget;
   CHECK(s.sky_area.empty() || s.sky_area.size() == n);
   CHECK(s.ground_area.empty() || s.ground_area.size() == n);
   CHECK(s.ground_area.empty() || s.ground_temperature.size() == n);
+  CHECK(s.ground_effusivity.empty() || s.ground_effusivity.size() == n);
   CHECK(s.dissipation.empty() || s.dissipation.size() == n);
 
   raise_columns(s);
@@ -345,7 +348,7 @@ void Heat::lose(Real dt, const Surroundings& s, bool flush, HeatBudget& budget) 
 
 /// Conductance [W/K] between what is next to the ground, a layer of `thickness` [m] of one temperature, and the ground;
 /// mean over the coming dt of contact. Advances the clock. 0 without contact.
-Real Heat::ground_conductance(std::size_t i, Real dt, Real area, Real thickness, Real layer_enthalpy) {
+Real Heat::ground_conductance(std::size_t i, Real dt, Real area, Real thickness, Real layer_enthalpy, Real ground_temperature, Real effusivity) {
   Real& t = contact_time_[i];
   if (area <= 0) {
     t = std::max(0.0, t - dt);
@@ -356,9 +359,13 @@ Real Heat::ground_conductance(std::size_t i, Real dt, Real area, Real thickness,
   t += dt;
   const Real tau = std::min(root * root * k / (density_ * options_.curve.heat_capacity * thickness * thickness), kPi / 16);
   Real resistance = thickness / k * (std::sqrt(kPi * tau) - 2 * tau);
-  if (options_.ground_conductance > 0) resistance += 1 / options_.ground_conductance;
+  const Real inside = resistance;
+  if (effusivity > 0) resistance += std::sqrt(kPi) * root / effusivity;
+  else if (options_.ground_conductance > 0) resistance += 1 / options_.ground_conductance;
   else if (options_.ground_effusivity > 0) resistance += std::sqrt(kPi) * root / options_.ground_effusivity;
   else return 0;
+  // What is next to the ground has come so much nearer to its own temperature than the ground was.
+  touched_temperature_[i] = ground_temperature + (1 - inside / resistance) * (options_.curve.temperature(layer_enthalpy) - ground_temperature);
   return area / resistance;
 }
 
@@ -371,7 +378,7 @@ HeatBudget Heat::lose_column(std::size_t c, Real dt, const Surroundings& s, bool
   const bool turned = (sky > 0) == (column.buried > 0);
   column.buried = sky > 0 ? 0 : column.buried + dt;
   const Real area = at(s.ground_area, i);
-  column.pending_ground += dt * ground_conductance(i, dt, area, shape_.share[kLast] * column.depth, column.H[kLast]);
+  column.pending_ground += dt * ground_conductance(i, dt, area, shape_.share[kLast] * column.depth, column.H[kLast], at(s.ground_temperature, i), at(s.ground_effusivity, i));
   if (area > 0) column.ground_temperature = s.ground_temperature[i];
 
   const Real k = std::max(options_.conductivity, options_.solid_conductivity);
@@ -397,6 +404,7 @@ HeatBudget Heat::lose_column(std::size_t c, Real dt, const Surroundings& s, bool
     if (exposed > 0) column.age += h;
     left -= h;
   }
+  given_[i] += budget.ground;
   column.pending = column.pending_sky = column.pending_ground = 0;
   Real mean = 0;
   for (int j = 0; j < kColumnCells; ++j) mean += shape_.share[j] * column.H[j];
@@ -407,7 +415,7 @@ HeatBudget Heat::lose_column(std::size_t c, Real dt, const Surroundings& s, bool
 
 HeatBudget Heat::lose_lump(std::size_t i, Real dt, const Surroundings& s) {
   const Real sky = std::max(0.0, at(s.sky_area, i)), area = at(s.ground_area, i);
-  const Real G = ground_conductance(i, dt, area, spacing_, enthalpy_[i]);
+  const Real G = ground_conductance(i, dt, area, spacing_, enthalpy_[i], at(s.ground_temperature, i), at(s.ground_effusivity, i));
   const Real ground_T = area > 0 ? s.ground_temperature[i] : 0;
   if (sky <= 0 && G <= 0) return {};
   const EnthalpyCurve& curve = options_.curve;
@@ -450,6 +458,7 @@ HeatBudget Heat::lose_lump(std::size_t i, Real dt, const Surroundings& s) {
     budget.ground += h * ground + (sky > 0 ? 0 : rest);
     enthalpy_[i] = H;
   }
+  given_[i] += budget.ground;
   refresh_particle(i);
   return budget;
 }

@@ -94,6 +94,7 @@ class Heat {
     std::span<const Real> ground_area;   ///< in touch with the ground [m^2]. Empty: none anywhere
     std::span<const Real> ground_temperature;  ///< of the undisturbed ground [K]; read where ground_area > 0
     std::span<const Real> dissipation;   ///< [W/m^3], >= 0; or empty
+    std::span<const Real> ground_effusivity = {};  ///< b of what it touches there [J/(m^2 K s^0.5)]; 0, or empty: the options' ground
   };
   /// Whether step(dt) will loop over the pairs. If not, neighbors may be of any size and age.
   bool conducts(Real dt) const { return options_.on && pair_time_ + dt >= interval_; }
@@ -113,6 +114,11 @@ class Heat {
   std::span<const Real> crust_share() const { return crust_share_; }
   std::span<const Real> solid_fraction() const { return solid_fraction_; }            ///< by mass, 0 to 1
   std::span<const Real> enthalpy() const { return enthalpy_; }                        ///< mean of the particle [J/kg]
+  /// Of the last step, by particle: what was booked as given to the ground, or whatever ground_area is in touch with [J]; and how hot that is
+  /// where they touch [K], 0 where they do not. From the step's beginning: of two half-spaces brought together
+  /// (b T + b_ground T_ground) / (b + b_ground).
+  std::span<const Real> given() const { return given_; }
+  std::span<const Real> touched_temperature() const { return touched_temperature_; }
   Real total_enthalpy() const;                                                        ///< [J]
   Real particle_mass() const { return mass_; }
 
@@ -146,7 +152,7 @@ class Heat {
   void lose(Real dt, const Surroundings& s, bool flush, HeatBudget& budget);
   HeatBudget lose_column(std::size_t c, Real dt, const Surroundings& s, bool flush);
   HeatBudget lose_lump(std::size_t i, Real dt, const Surroundings& s);
-  Real ground_conductance(std::size_t i, Real dt, Real area, Real thickness, Real layer_enthalpy);
+  Real ground_conductance(std::size_t i, Real dt, Real area, Real thickness, Real layer_enthalpy, Real ground_temperature, Real effusivity);
   void refresh();
   void refresh_particle(std::size_t i);
   Real conductivity(Real enthalpy) const;
@@ -170,6 +176,7 @@ class Heat {
   // Scratch of an exchange. A node is what pairs exchange with: a particle, or its column's last cell.
   std::vector<Packed> packed_;
   std::vector<Real> node_, node_before_, gain_, rate_;  // [J/kg], [J/kg], [W/kg], [1/s]
+  std::vector<Real> given_, touched_temperature_;       // of the last step
 };
 
 }  // namespace effuse::flow::sph

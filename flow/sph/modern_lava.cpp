@@ -37,7 +37,7 @@ constexpr Real kSlow = 0.5;           // sqrt(g dx): slower lava all but stands
 constexpr Real kWake = 2;            // times sleep_speed
 constexpr int kNap = 16;             // steps of max_step that sleepers' heat takes at a time while nobody is awake
 constexpr int kSettle = 3;           // rounds between ground and obstacles, at most
-constexpr std::string_view kModel = "modern 4";  // of a checkpoint: changes with what is saved
+constexpr std::string_view kModel = "modern 5";  // of a checkpoint: changes with what is saved
 
 BoundaryTable make_table(KernelKind kind, Real support, Real spacing) {
   switch (kind) {
@@ -69,6 +69,8 @@ struct ModernLava::Impl {
   std::vector<Real> mu, density;        // of the last step
   std::vector<Real> exposed, grounded;  // [m^2]
   std::vector<Real> ground_T;           // of the ground it lies on [K]
+  std::vector<Real> ground_b;           // its effusivity; 0: the ground's own
+  std::vector<Index> touches;           // its surface
   std::vector<Real> slow;               // [s] for how long it has been slow
   std::vector<std::uint8_t> surface, asleep;
   Census census;
@@ -114,7 +116,7 @@ struct ModernLava::Impl {
         film(table, o.spacing),
         frames(o.rest_period),
         ground({support, std::isfinite(o.ground_speed) ? kLook * support : support, kClearance * o.spacing, 8}, std::move(sources), std::move(inside)),
-        solids(solid_options, kClearance * o.spacing, mass),
+        solids(solid_options, kClearance * o.spacing, mass, film.widest()),
         emitter(std::move(vents), o.spacing, o.seed, ground.sources()),
         heat(o.heat, o.spacing, o.density) {
     CHECK_GT(o.spacing, 0.0);
@@ -142,6 +144,8 @@ struct ModernLava::Impl {
     exposed.push_back(0);
     grounded.push_back(0);
     ground_T.push_back(o.ground_temperature);
+    ground_b.push_back(0);
+    touches.push_back(0);
     slow.push_back(0);
     surface.push_back(1);
     asleep.push_back(0);
@@ -159,6 +163,8 @@ struct ModernLava::Impl {
     gather(exposed, which);
     gather(grounded, which);
     gather(ground_T, which);
+    gather(ground_b, which);
+    gather(touches, which);
     gather(slow, which);
     gather(surface, which);
     gather(asleep, which);
@@ -179,6 +185,8 @@ struct ModernLava::Impl {
     io.array("exposed", self.exposed);
     io.array("grounded", self.grounded);
     io.array("ground_T", self.ground_T);
+    io.array("ground_b", self.ground_b);
+    io.array("touches", self.touches);
     io.array("slow", self.slow);
     io.array("surface", self.surface);
     io.array("asleep", self.asleep);
@@ -313,6 +321,8 @@ struct ModernLava::Impl {
         if (wall.reach >= nearest) continue;
         nearest = wall.reach;
         ground_T[i] = wall.temperature > 0 ? wall.temperature : o.ground_temperature;
+        ground_b[i] = wall.effusivity;
+        touches[i] = wall.surface;
       }
     }, 2048);
   }
@@ -468,7 +478,9 @@ struct ModernLava::Impl {
                                  .sky_area = exposed,
                                  .ground_area = grounded,
                                  .ground_temperature = ground_T,
-                                 .dissipation = all ? std::span<const Real>(scratch) : std::span<const Real>(power)});
+                                 .dissipation = all ? std::span<const Real>(scratch) : std::span<const Real>(power),
+                                 .ground_effusivity = solids.any() ? std::span<const Real>(ground_b) : std::span<const Real>()});
+    if (solids.any()) solids.warm(touches, heat.given(), heat.touched_temperature());
   }
 
   std::size_t emit(Real t0, Real t1) {
@@ -658,7 +670,7 @@ struct ModernLava::Impl {
     archive(*this, in);
     heat.load(in);
     const std::size_t n = size();
-    check_loaded_sizes(n, {v.size(), q.size(), mu.size(), density.size(), exposed.size(), grounded.size(), ground_T.size(), slow.size(), surface.size(), asleep.size(),
+    check_loaded_sizes(n, {v.size(), q.size(), mu.size(), density.size(), exposed.size(), grounded.size(), ground_T.size(), ground_b.size(), touches.size(), slow.size(), surface.size(), asleep.size(),
                            heat.size()});
     census.check_loaded(n);
     frames.check_loaded(n);
@@ -777,7 +789,7 @@ geometry::Points ModernLava::points() const {
 std::size_t ModernLava::memory() const {
   const Impl& m = *impl_;
   const auto bytes = [](const auto&... vectors) { return ((vectors.capacity() * sizeof(vectors[0])) + ...); };
-  return bytes(m.x, m.v, m.q, m.mu, m.density, m.exposed, m.grounded, m.ground_T, m.slow, m.surface, m.asleep) + m.census.memory() + m.frames.memory() +
+  return bytes(m.x, m.v, m.q, m.mu, m.density, m.exposed, m.grounded, m.ground_T, m.ground_b, m.touches, m.slow, m.surface, m.asleep) + m.census.memory() + m.frames.memory() +
          m.ground.memory() + m.solids.memory() + m.emitter.memory() + m.heat.memory() + m.grid.memory() + m.neighbors.memory() + m.pairs.memory() + m.shape.memory() + m.viscosity.memory() +
          m.pressure.memory() + bytes(m.set.particles, m.walls.first, m.walls.walls, m.lx, m.lv, m.start, m.predicted, m.viscous_v, m.lq, m.lmu, m.rate, m.least,
                                      m.scratch, m.wall_distances, m.fixed, m.before_x, m.radius, m.crust, m.age, m.p);

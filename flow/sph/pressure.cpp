@@ -59,11 +59,32 @@ bool any_mirrors(std::span<const Wall> walls) {
 }
 }  // namespace
 
+namespace {
+/// Share of what lies behind two walls of what the shares a and b lie behind one: as trim_walls() has it.
+Real hidden_by_both(Real a, Real b, Real cosine) {
+  const Real c = 2 / kPi * std::asin(std::clamp(cosine, -1.0, 1.0));
+  return c >= 0 ? (1 - c) * a * b + c * std::min(a, b) : (1 + c) * a * b;
+}
+
+/// 2 P slope n: what a wall pushes at unit pressure.
+Vec3 push_of(const ParticleSystem& s, const Wall& wall, const Mat3& P) { return 2 * s.boundary->at(wall).slope * (P * wall.normal); }
+}  // namespace
+
 Mat3 mirrored(const ParticleSystem& s, std::size_t i) {
   if (!any_mirrors((*s.walls)[i])) return Mat3::Identity();
+  const std::span<const Wall> walls = (*s.walls)[i];
+  const auto missing = [&](const Wall& wall) { return s.boundary->at(wall.distance).moment_t; };
+  const auto along = [](const Wall& wall) { return Mat3(Mat3::Identity() - wall.normal * wall.normal.transpose()); };
   Mat3 own = Mat3::Identity();
-  for (const Wall& wall : (*s.walls)[i])
-    if (wall.mirrors) own -= s.boundary->at(wall).moment_t * (Mat3::Identity() - wall.normal * wall.normal.transpose());
+  for (std::size_t a = 0; a < walls.size(); ++a) {
+    if (!walls[a].mirrors) continue;
+    own -= missing(walls[a]) * along(walls[a]);
+    for (std::size_t b = 0; b < a; ++b) {
+      if (!walls[b].mirrors) continue;
+      const Mat3 both = along(walls[a]) * along(walls[b]);
+      own += hidden_by_both(missing(walls[a]), missing(walls[b]), walls[a].normal.dot(walls[b].normal)) / 2 * (both + both.transpose());
+    }
+  }
   const Eigen::SelfAdjointEigenSolver<Mat3> eigen(own);
   return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(kLeastOwn).cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose();
 }
@@ -94,7 +115,10 @@ void compression_rate(const ParticleSystem& s, std::span<const Vec3> velocities,
   parallel_ranges(s.size(), kGrain, [&](std::size_t begin, std::size_t end) {
     pairs->divergence(begin, end, v, out);
     for (std::size_t i = begin; i < end; ++i)
-      for (const Wall& wall : (*s.walls)[i]) out[i] += 2 * s.boundary->at(wall).slope * wall.normal.dot(velocities[i] - s.velocity_of(wall));
+      if (const std::span<const Wall> walls = (*s.walls)[i]; !walls.empty()) {
+        const Mat3 P = mirrored(s, i);
+        for (const Wall& wall : walls) out[i] += push_of(s, wall, P).dot(velocities[i] - s.velocity_of(wall));
+      }
   });
 }
 
@@ -105,9 +129,12 @@ void pressure_acceleration(const ParticleSystem& s, std::span<const Real> q, std
   parallel_ranges(s.size(), kGrain, [&](std::size_t begin, std::size_t end) {
     pairs->gradient(begin, end, q, out);
     for (std::size_t i = begin; i < end; ++i) {
-      Vec3 sum = any_mirrors((*s.walls)[i]) ? Vec3(mirrored(s, i) * out[i]) : out[i];
-      for (const Wall& wall : (*s.walls)[i]) sum += 2 * q[i] * s.boundary->at(wall).slope * wall.normal;
-      out[i] = -sum;
+      if (const std::span<const Wall> walls = (*s.walls)[i]; !walls.empty()) {
+        const Mat3 P = mirrored(s, i);
+        out[i] = P * out[i];
+        for (const Wall& wall : walls) out[i] += q[i] * push_of(s, wall, P);
+      }
+      out[i] = -out[i];
     }
   });
 }
@@ -119,12 +146,12 @@ void push_movables(const ParticleSystem& s, std::span<const Real> q, std::span<c
   for (std::size_t i = 0; i < s.size(); ++i) {
     if (s.is_fixed(i) || std::none_of((*s.walls)[i].begin(), (*s.walls)[i].end(), [](const Wall& wall) { return wall.movable != kNotMovable; })) continue;
     Vec3 sum = a[i];
+    const Mat3 P = mirrored(s, i);
     for (const Wall& wall : (*s.walls)[i]) {
-      const Vec3 push = 2 * q[i] * s.boundary->at(wall).slope * wall.normal;
+      const Vec3 push = q[i] * push_of(s, wall, P);
       sum += push;
       if (wall.movable != kNotMovable) s.movable[wall.movable].push(dt * mass * push, wall.arm);
     }
-    const Mat3 P = mirrored(s, i);
     const Vec3 extra = sum - P.inverse() * sum;  // (P - 1) of what the pairs gave
     for_each_mirror(s, i, [&](const Wall& wall, Real weight) {
       if (wall.movable != kNotMovable) s.movable[wall.movable].push(-dt * mass * weight * extra, wall.arm);
@@ -206,8 +233,9 @@ void PressureSolver::prepare(const ParticleSystem& s) {
     for (std::size_t i = begin; i < end; ++i) {
       Real diagonal = scale_[i];
       Vec3 slope(a_[i].x, a_[i].y, a_[i].z);
+      const Mat3 P = mirrored(s, i);
       for (Index k = s.walls->first[i]; k < s.walls->first[i + 1]; ++k) {
-        push_[k] = 2 * s.boundary->at(s.walls->walls[k]).slope * s.walls->walls[k].normal;
+        push_[k] = push_of(s, s.walls->walls[k], P);
         slope += push_[k];
         if (s.walls->walls[k].movable != kNotMovable && !s.is_fixed(i)) {
           const Wall& wall = s.walls->walls[k];

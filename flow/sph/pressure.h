@@ -20,10 +20,12 @@ void compression_rate(const ParticleSystem& system, std::span<const Vec3> v, std
 /// Walls that mirror (Wall::mirrors) have their mirror image counted in full: what flows along them counts for the lava's half of the
 /// kernel and for the image's. Beside them v stands for v + (P - 1)(v - v_wall) above, and below the sum over j is multiplied by P,
 ///
-///   P = (1 - sum_walls moment_t (1 - n n^T))^-1
+///   P = (1 - sum_walls m T + sum_pairs m_ab T_a T_b)^-1,   T = 1 - n n^T,  m = moment_t of the wall alone
 ///
-/// one over the share of the kernel that the lava has, v_wall the mean of the walls' weighted by moment_t; what P adds pushes the wall
-/// back. D and D^T stay transposes of each other. Without it lava at rest creeps down upright walls, by 0.1 g spacing^2 / nu.
+/// one over the share of the kernel that the lava has along them; m_ab is what two walls hide both, put together as in trim_walls().
+/// v_wall is the mean of the walls' weighted by moment_t; what P adds pushes the wall back. All walls' own terms, too, have P n for n: in
+/// a corner the floor goes on beneath the wall's mirror image. D and D^T stay transposes of each other. Without it lava at rest creeps down
+/// upright walls, by 0.1 g spacing^2 / nu.
 Mat3 mirrored(const ParticleSystem& system, std::size_t i);
 
 /// Acceleration [m/s^2] by the kinematic pressures q = p / rho [m^2/s^2]:

@@ -5,10 +5,10 @@
 #include <cmath>
 
 #include "flow/sph/particle_arrays.h"
+#include "flow/sph/wall_backing.h"
 #include "geometry/base/check.h"
 #include "geometry/base/parallel.h"
 #include "geometry/base/zones.h"
-#include "geometry/collide/swept.h"
 
 namespace effuse::flow::sph {
 
@@ -46,67 +46,12 @@ void find_near(const geometry::Obstacles& obstacles, std::size_t count, Real by,
   for (std::size_t k = 0; k < count; ++k)
     if (flags[k]) near.push_back(static_cast<Index>(k));
 }
-
-/// Rays to the half-space beyond a wall's plane, to a ring in the midst of what adds to the drag along the plane (BoundaryTable's drag_t).
-constexpr int kAzimuths = 8;
-constexpr Real kDeep = 0.3;      // of the way from the plane to the end of reach: the ring's depth
-constexpr Real kWide = 0.65;     // of the reach's circle there: its radius
-constexpr Real kDragging = 0.6;  // of the reach: walls further off drag by a few hundredths of what near ones do, edges or not
-constexpr Real kRing = 0.7;      // of the plane's circle in reach: where few rays look first
-
-/// What stands around a particle, for its walls' backing.
-class Backing {
- public:
-  Backing(const geometry::Obstacles& obstacles, Real reach) : obstacles_(obstacles), reach_(reach) {}
-
-  /// Share of a wall's half-space that is hidden from x by obstacles, or lies in the ground: 1 but beside convex edges.
-  Real share(const Vec3& x, const Contact& wall, std::span<const Wall> ground) {
-    const Real d = wall.distance;
-    if (!(d > 0 && d < kDragging * reach_)) return 1;
-    obstacles_.meeting(Box3(x - Vec3::Constant(reach_), x + Vec3::Constant(reach_)), near_);
-    const Vec3 first = wall.normal.unitOrthogonal(), second = wall.normal.cross(first);
-    const auto behind = [&](Real azimuth, Real depth, Real off, bool deep) {
-      return hidden(x, (off * std::cos(azimuth)) * first + (off * std::sin(azimuth)) * second - depth * wall.normal, ground, deep);
-    };
-    const Real circle = std::sqrt(reach_ * reach_ - d * d);
-    bool whole = true;
-    for (int a = 0; a < 4 && whole; ++a) whole = behind(a * kPi / 2 + kPi / 7, (1 + kBelow) * d, kRing * circle, false);
-    if (whole) return 1;
-    const Real depth = d + kDeep * (reach_ - d), off = kWide * std::sqrt(reach_ * reach_ - depth * depth);
-    int hit = 0;
-    for (int a = 0; a < kAzimuths; ++a) hit += behind((a + 0.5) * 2 * kPi / kAzimuths, depth, off, true);
-    return static_cast<Real>(hit) / kAzimuths;
-  }
-
- private:
-  static constexpr Real kBelow = 0.01;    // of the distance: just through the plane
-  static constexpr Real kFarSide = 0.7;   // cosine between a wall's sides
-
-  /// deep: a ray that may come out of the solid again.
-  bool hidden(const Vec3& x, const Vec3& ray, std::span<const Wall> ground, bool deep) const {
-    for (const Wall& wall : ground)
-      if (wall.distance + wall.normal.dot(ray) < 0) return true;
-    return std::any_of(near_.begin(), near_.end(), [&](Index k) {
-      const geometry::Obstacle& obstacle = obstacles_[k];
-      const geometry::RigidPose& pose = obstacle.motion.to();
-      const Vec3 from = pose.body(x), to = pose.body(x + ray);
-      const auto in = geometry::sweep(obstacle.shape, from, to, 0);
-      if (!in || !deep) return in.has_value();
-      // Out of the solid again: by its far side (a thin wall, a sheet) or past an edge.
-      const auto out = geometry::sweep(obstacle.shape, to, from, 0);
-      return !out || out->normal.dot(in->normal) < -kFarSide;
-    });
-  }
-
-  const geometry::Obstacles& obstacles_;
-  Real reach_;
-  std::vector<Index> near_;
-};
 }  // namespace
 
-Solids::Solids(const SolidOptions& options, Real radius, Real mass) : options_(options), radius_(radius), mass_(mass) {
+Solids::Solids(const SolidOptions& options, Real radius, Real mass, Real widest) : options_(options), radius_(radius), mass_(mass), widest_(widest) {
   CHECK_GT(radius, 0.0);
   for (const Real f : options.friction) CHECK(f >= 0 && f <= 1);
+  for (const Real b : options.effusivity) CHECK(std::isfinite(b) && b >= 0);
 }
 
 void Solids::restart(Real dt) {
@@ -152,19 +97,21 @@ void Solids::rest() {
   all.update();
 }
 
-Real Solids::friction_of(Index surface) const {
-  if (options_.friction_by) return options_.friction_by(surface);
-  return surface < options_.friction.size() ? options_.friction[surface] : 1;
-}
-
-void Solids::find_backing(std::span<const Vec3> x, Real reach, const Walls& ground) {
+void Solids::look_behind(std::span<const Vec3> x, Real reach, const Walls& ground) {
   ZONE("sph.solids.edges");
   backing_.assign(contacts_.size(), 1.0);
+  across_.assign(contacts_.size(), kNothingAcross);
   parallel_ranges(near_.size(), 64, [&](std::size_t begin, std::size_t end) {
-    Backing backing(*options_.obstacles, reach);
+    WallBacking backing(*options_.obstacles, reach);
     for (std::size_t q = begin; q < end; ++q)
-      for (std::size_t c = q * kMost; c < (q + 1) * kMost && contacts_[c].any(); ++c)
-        if (friction_of(contacts_[c].surface) > 0) backing_[c] = backing.share(x[near_[q]], contacts_[c], ground[near_[q]]);
+      for (std::size_t c = q * kMost; c < (q + 1) * kMost && contacts_[c].any(); ++c) {
+        if (friction_of(contacts_[c].surface) == 0) continue;
+        backing_[c] = backing.share(x[near_[q]], contacts_[c], ground[near_[q]]);
+        if (const auto opposite = backing.opposite(x[near_[q]], contacts_[c], widest_)) {
+          // Between a wall that holds lava and one that lets it slip lies half a channel between two that hold it.
+          across_[c] = friction_of(opposite->surface) > 0 ? opposite->width : 2 * opposite->width;
+        }
+      }
   });
 }
 
@@ -192,7 +139,7 @@ void Solids::add_walls(std::span<const Vec3> x, Real reach, Walls& walls) {
       ++added;
     }
   if (added == 0) return;
-  find_backing(x, reach, walls);
+  look_behind(x, reach, walls);
   merged_.first.resize(x.size() + 1);
   merged_.walls.resize(walls.walls.size() + added);
   std::size_t q = 0;
@@ -207,7 +154,7 @@ void Solids::add_walls(std::span<const Vec3> x, Real reach, Walls& walls) {
       const auto body = std::find_if(movable_.begin(), movable_.end(), [&](const Movable& m) { return m.surface == contact.surface; });
       const bool moves = body != movable_.end();
       merged_.walls[place++] = {.normal = contact.normal, .distance = contact.distance, .reach = contact.distance, .surface = contact.surface,
-                                .velocity = contact.surface_velocity, .temperature = contact.surface_temperature, .friction = friction,
+                                .velocity = contact.surface_velocity, .temperature = contact.surface_temperature, .effusivity = effusivity_of(contact.surface), .friction = friction, .across = across_[q * kMost + c],
                                 .mirrors = true, .movable = moves ? static_cast<Index>(body - movable_.begin()) : kNotMovable,
                                 .arm = moves ? Vec3(contact.point - body->centre) : Vec3::Zero()};
       speed_ = std::max(speed_, contact.surface_velocity.norm());
@@ -250,9 +197,24 @@ geometry::SlideReport Solids::slide(std::span<const Index> which, std::span<cons
   return report;
 }
 
+void Solids::warm(std::span<const Index> touches, std::span<const Real> given, std::span<const Real> temperature) {
+  if (!options_.heated) return;
+  std::vector<Real> heat(1, 0.0), hottest(1, 0.0);
+  for (std::size_t i = 0; i < given.size(); ++i) {
+    if (given[i] == 0 && temperature[i] == 0) continue;
+    if (touches[i] >= heat.size()) {
+      heat.resize(touches[i] + 1, 0.0);
+      hottest.resize(heat.size(), 0.0);
+    }
+    heat[touches[i]] += given[i];
+    hottest[touches[i]] = std::max(hottest[touches[i]], temperature[i]);
+  }
+  options_.heated(heat, hottest);
+}
+
 std::size_t Solids::memory() const {
   const auto bytes = [](const auto&... vectors) { return ((vectors.capacity() * sizeof(vectors[0])) + ...); };
-  return bytes(near_, at_, way_, speed_at_, contacts_, backing_, count_, flags_, merged_.first, merged_.walls);
+  return bytes(near_, at_, way_, speed_at_, contacts_, backing_, across_, count_, flags_, merged_.first, merged_.walls);
 }
 
 }  // namespace effuse::flow::sph

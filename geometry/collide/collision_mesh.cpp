@@ -174,6 +174,7 @@ std::string to_string(const CollisionReport& r) {
   std::string text = fmt::format("{} triangles: {} solids", r.triangles, r.solids);
   if (r.turned > 0) text += fmt::format(" ({} turned outward)", r.turned);
   text += fmt::format(", {} sheets", r.sheets);
+  if (r.cavities > 0) text += fmt::format(", {} cavities", r.cavities);
   if (r.crossing > 0) text += fmt::format("; {} solids that others may reach into", r.crossing);
   if (r.flipped > 0) text += fmt::format("; {} triangles flipped", r.flipped);
   if (r.dropped > 0) text += fmt::format("; {} triangles without area dropped", r.dropped);

@@ -19,6 +19,7 @@ struct CollisionReport {
   std::size_t parts = 0, solids = 0, sheets = 0;  ///< parts = solids + sheets
   std::size_t flipped = 0;   ///< triangles turned over so that a closed part's run the same way round
   std::size_t turned = 0;    ///< solids that faced inward as a whole, turned outward
+  std::size_t cavities = 0;  ///< closed parts that face inward, wholly within a solid: room in it, counted with it
   std::size_t crossing = 0;  ///< solids that other parts may reach into: asked one by one
 };
 
@@ -31,7 +32,7 @@ std::string to_string(const CollisionReport& report);
 /// Vertices at equal positions are one. Triangles are joined into parts across edges that just two of them share. A
 /// part that is then closed, can be oriented and encloses a volume is a *solid* (its triangles are turned to face
 /// outward); every other is a *sheet*, of no thickness and with two sides alike. Inside is what is inside any solid:
-/// of nested solids the inner one makes no cavity. (A part that cuts through itself keeps its distances; inside it, beside
+/// of nested solids the inner one makes no cavity, unless it faces inward, and neither touches nor cuts another part. (A part that cuts through itself keeps its distances; inside it, beside
 /// the cut, the sign is that of the nearest sheet.)
 ///
 /// Candidates are found in a tree of boxes that FCL builds (BVHModel); what is answered is computed in double from the

@@ -29,6 +29,7 @@ struct CollisionMesh::Impl {
   std::vector<std::array<Vec3, 3>> corners;  ///< of those in the tree
   std::vector<Index> part;                   ///< per triangle
   std::vector<char> is_solid;                ///< per part
+  std::vector<Index> turned_parts;           ///< solids that faced inward
   BoxTree tree;
   bool hollow = true;            ///< some edge is, or there are several parts: several surfaces may stand around a point
   std::vector<char> smooth;      ///< per triangle: its sides and corners are seen by none before a neighbour's face is
@@ -62,6 +63,8 @@ struct CollisionMesh::Impl {
   std::vector<Triangle> standing_walls(std::span<const Triangle> walls) const;
   void find_parts();
   void orient_parts();
+  void renumber_sides();
+  void find_cavities();
   void make_normals();
   void make_trees();
   void find_hollows();

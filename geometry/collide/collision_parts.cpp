@@ -142,6 +142,7 @@ void Impl::prepare(const TriMesh& input) {
   use(std::move(seen));
   on_surface = kOnSurface * largest;
   orient_parts();
+  find_cavities();
   std::copy_n(triangles.begin(), mesh.triangles.size(), mesh.triangles.begin());
   make_normals();
   make_trees();
@@ -279,7 +280,15 @@ void Impl::orient_parts() {
     }
     report.flipped += flipped;
     report.turned += inward;
+    if (inward) turned_parts.push_back(static_cast<Index>(p));
   }
+  renumber_sides();
+  report.parts = is_solid.size();
+  report.solids = static_cast<std::size_t>(std::count(is_solid.begin(), is_solid.end(), 1));
+  report.sheets = report.parts - report.solids;
+}
+
+void Impl::renumber_sides() {
   // Who was flipped is met at other sides now.
   for (Index t = 0; t < triangles.size(); ++t) {
     for (Index k = 0; k < 3; ++k) {
@@ -295,9 +304,6 @@ void Impl::orient_parts() {
       }
     }
   }
-  report.parts = is_solid.size();
-  report.solids = static_cast<std::size_t>(std::count(is_solid.begin(), is_solid.end(), 1));
-  report.sheets = report.parts - report.solids;
 }
 
 void Impl::make_normals() {

@@ -20,7 +20,7 @@ constexpr std::size_t kMost = 16;
 }  // namespace
 
 void Impl::find_hollows() {
-  hollow = report.parts > 1;
+  hollow = report.parts > 1 || report.cavities > 0;
   smooth.assign(mesh.triangles.size(), 1);
   for (Index t = 0; t < mesh.triangles.size(); ++t)
     for (int side = 0; side < 3; ++side) {

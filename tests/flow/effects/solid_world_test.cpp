@@ -128,6 +128,69 @@ Floating float_block(Real share, Real dx, Real until) {
   return result;
 }
 
+/// An upright cylinder, open at the top: a sheet of so many sides.
+TriMesh tube(Real radius, Real height, int sides) {
+  TriMesh m;
+  for (int k = 0; k < sides; ++k)
+    for (const Real z : {0.0, height}) m.positions.push_back(Vec3(radius * std::cos(2 * kPi * k / sides), radius * std::sin(2 * kPi * k / sides), z));
+  m.positions.push_back(Vec3::Zero());
+  const auto n = static_cast<Index>(sides);
+  for (Index k = 0; k < n; ++k) {
+    const Index next = (k + 1) % n;
+    m.triangles.push_back({2 * k, 2 * next, 2 * k + 1});
+    m.triangles.push_back({2 * next, 2 * next + 1, 2 * k + 1});
+    m.triangles.push_back({2 * k, 2 * n, 2 * next});
+  }
+  return m;
+}
+
+struct Sinking {
+  Real speed = 0, exact = 0, reynolds = 0;
+};
+/// A ball of radius a, twice and a half as heavy as the lava, sinks along the axis of a tube of radius a / share, a / dx = fine. What it reaches, and
+/// Stokes's speed with Haberman's correction for the tube's wall (Happel & Brenner 1965, Low Reynolds Number Hydrodynamics, 7-3):
+///   U = 2 a^2 (rho_ball - rho) g / (9 mu K),  K = (1 - 0.75857 s^5) / (1 - 2.1050 s + 2.0865 s^3 - 1.7068 s^5 + 0.72603 s^6),  s = share
+/// The bottom and the surface are more than a tube's radius away, where they count for less than a hundredth.
+Sinking sink_ball(Real share, Real fine) {
+  const Real a = 1, dx = a / fine, R = a / share, H = 5 * R, mu = 40000;
+  ModernOptions o = thick(dx, mu);
+  o.max_step = 0.25;
+  PlacedBody ball;
+  ball.name = "ball";
+  ball.mesh = geometry::make_sphere(Vec3::Zero(), a, 3);
+  ball.density = 2.5 * o.density;
+  ball.pose.position = Vec3(0, 0, 0.62 * H);
+  const PlacedObstacle vessel = {"tube", CollisionMesh(tube(R, 1.5 * H, 96)), geometry::PoseTrack(std::vector<geometry::PoseKey>(1)), 0, 1};
+  SolidWorld world({vessel}, {ball}, nullptr);
+  ModernLava lava(o, {}, {ground_at(-100)}, {}, world.solids());
+  std::vector<Vec3> x;
+  const int wide = 2 * static_cast<int>(std::ceil(R / dx));
+  for (Vec3 p : sph::lattice_block(wide, wide, static_cast<int>(std::lround(H / dx)), dx)) {
+    p -= Vec3(wide * dx / 2, wide * dx / 2, 0);
+    if (p.head<2>().norm() < R - 0.3 * dx && (p - ball.pose.position).norm() > a + 0.3 * dx) x.push_back(p);
+  }
+  fill(lava, x, std::vector<Vec3>(x.size(), Vec3::Zero()));
+  Sinking result;
+  const Real s = share, K = (1 - 0.75857 * std::pow(s, 5)) / (1 - 2.1050 * s + 2.0865 * std::pow(s, 3) - 1.7068 * std::pow(s, 5) + 0.72603 * std::pow(s, 6));
+  result.exact = 2 * a * a * 1.5 * o.density * kGravity / (9 * mu * K);
+  // It has no inertia to speak of: the mean over half a radius, soon.
+  const auto depth = [&] { return 0.62 * H - world.poses()[0].position.z(); };
+  while (depth() < 0.25 * a && lava.time() < 20 * a / result.exact) lava.step(0.25);
+  const Real from = depth(), begin = lava.time();
+  while (depth() < 0.75 * a && lava.time() < 20 * a / result.exact) lava.step(0.25);
+  result.speed = (depth() - from) / (lava.time() - begin);
+  result.reynolds = o.density * result.speed * a / mu;
+  std::cout << "ball of " << fine << " spacings in a tube " << 1 / share << " times as wide: " << result.speed << " m/s, exact " << result.exact << " (" << 100 * (result.speed / result.exact - 1)
+            << " %), wall correction " << K << ", Re " << result.reynolds << ", " << lava.size() << " particles\n";
+  return result;
+}
+
+TEST(SolidWorldSlow, ABallSinksAsFastAsStokesAndHabermanSay) {
+  const Sinking ball = sink_ball(0.5, 4);
+  EXPECT_LT(ball.reynolds, 0.1);
+  EXPECT_NEAR(ball.speed, ball.exact, 0.1 * ball.exact);
+}
+
 TEST(SolidWorldSlow, AFloatingBlockDrawsWhatArchimedesSays) {
   for (const Real share : {0.3, 0.6, 0.8}) {
     const Floating f = float_block(share, 0.25, 8);

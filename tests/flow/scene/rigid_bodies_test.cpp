@@ -66,9 +66,9 @@ TEST(SceneBodies, AloneMakeAnEffectAndTheGroundMayBeAPlane) {
   EXPECT_EQ(scene.effects[0].estimate.steps, 200);
   EXPECT_TRUE(scene.body_settings.penalty);
   EXPECT_EQ(scene.body_settings.penalty_frequency, 100);
-  ASSERT_TRUE(scene.plane);
-  EXPECT_EQ(scene.plane->size, Vec2(40, 30));
-  EXPECT_NEAR(scene.plane->slope, 10 * kPi / 180, 1e-12);
+  ASSERT_TRUE(scene.terrain.plane);
+  EXPECT_EQ(scene.terrain.plane->size, Vec2(40, 30));
+  EXPECT_NEAR(scene.terrain.plane->slope, 10 * kPi / 180, 1e-12);
 }
 
 TEST(SceneBodies, AResolvedSceneReadsBackToTheSame) {

@@ -312,11 +312,12 @@ struct Warm {
   Obstacles obstacles;
   ModernLava lava;
   HeatBudget budget;
-  explicit Warm(Real wall_temperature, Real lava_temperature = 1450) : lava(make(wall_temperature)) {
+  std::vector<Real> given = {0, 0, 0}, hottest = {0, 0, 0};  // to and of each surface; hottest in the last step
+  explicit Warm(Real wall_temperature, Real lava_temperature = 1450, std::vector<Real> effusivity = {}) : lava(make(wall_temperature, effusivity)) {
     std::vector<Vec3> x = lattice_block(kAcross, 6, kHigh, kSpacing);
     lava.add(x, std::vector<Vec3>(x.size(), Vec3::Zero()), std::vector<Real>(x.size(), lava_temperature));
   }
-  ModernLava make(Real wall_temperature) {
+  ModernLava make(Real wall_temperature, const std::vector<Real>& effusivity) {
     const Real width = kAcross * kSpacing;
     obstacles.add({CollisionMesh(geometry::make_box(Vec3(-3, -20, -20), Vec3(0, 20, 20))), {}, wall_temperature, 1});
     obstacles.add({CollisionMesh(geometry::make_box(Vec3(width, -20, -20), Vec3(width + 3, 20, 20))), {}, wall_temperature, 2});
@@ -329,7 +330,14 @@ struct Warm {
     o.heat.viscous_heating = false;
     o.heat.curve.latent_heat = 0;
     o.heat.air.emissivity = o.heat.air.convection = 0;
-    return {o, {}, {slope_to(-1e3)}, {}, {&obstacles, {}, {}}};
+    o.heat.crust = effusivity.empty();
+    SolidOptions solids{&obstacles, {}, {}};
+    solids.effusivity = effusivity;
+    solids.heated = [this](std::span<const Real> heat, std::span<const Real> temperature) {
+      hottest.assign(3, 0);
+      for (std::size_t k = 0; k < heat.size(); ++k) given[k] += heat[k], hottest[k] = temperature[k];
+    };
+    return {o, {}, {slope_to(-1e3)}, {}, solids};
   }
   Real area() const { return 2 * 6 * kHigh * kSpacing * kSpacing; }
   void run(Real until) {
@@ -365,6 +373,27 @@ TEST(Barrier, ColdWallsTakeWhatTwoHalfSpacesExchangeAndHotOnesGiveIt) {
       EXPECT_NEAR(warm.budget.ground, exact, 0.1 * std::abs(exact)) << "wall at " << wall << " K, " << t << " s";
       EXPECT_NEAR(before - warm.lava.heat().total_enthalpy(), warm.budget.ground, 1e-9 * before);
     }
+  }
+}
+
+// The same with a wall of concrete and one of steel: each takes what its own effusivity says, and is where lava touches it as hot as
+// two half-spaces brought together:  (b T + b_wall T_wall) / (b + b_wall).
+TEST(Barrier, WallsOfTheirOwnMaterialsTakeTheirOwnHeat) {
+  const Real concrete = std::sqrt(1.4 * 2300 * 880), steel = std::sqrt(60.5 * 7854 * 434), T_wall = 288.15, T_lava = 1450;
+  Warm warm(T_wall, T_lava, {0, concrete, steel});
+  const HeatOptions& heat = warm.lava.options().heat;
+  const Real before = warm.lava.heat().total_enthalpy(), b_lava = std::sqrt(heat.conductivity * kDensity * heat.curve.heat_capacity);
+  for (const Real t : {1000.0, 10000.0}) {
+    warm.run(t);
+    for (const Index wall : {1u, 2u}) {
+      const Real b = wall == 1 ? concrete : steel;
+      const Real exact = warm.area() / 2 * 2 * (T_lava - T_wall) / (1 / b_lava + 1 / b) * std::sqrt(t / kPi);
+      EXPECT_NEAR(warm.given[wall], exact, 0.01 * exact) << "wall " << wall << ", " << t << " s";
+      const Real contact = (b_lava * T_lava + b * T_wall) / (b_lava + b);
+      EXPECT_NEAR(warm.hottest[wall], contact, 0.02 * (contact - T_wall)) << "wall " << wall << ", " << t << " s";
+    }
+    EXPECT_NEAR(before - warm.lava.heat().total_enthalpy(), warm.given[1] + warm.given[2], 1e-9 * before);
+    EXPECT_NEAR(warm.given[0], 0, 1e-12 * before) << "no ground there";
   }
 }
 

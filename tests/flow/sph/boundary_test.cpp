@@ -209,29 +209,42 @@ TEST(BendWallsOnPlanes, LeavesPlanesAloneEvenTwoThatMeet) {
   }
 }
 
-class FilmFrictionTest : public testing::TestWithParam<int> {};
-
-TEST_P(FilmFrictionTest, GivesAFilmOnALatticeTheExactFlux) {
-  const int layers = GetParam();
-  const Real dx = 0.5, nu = 2, rho = 2600, force = 1.7;
-  SampleSystem s(lattice_block(6, 6, layers, dx), dx);
-  s.period = Vec2(6 * dx, 6 * dx);
-  s.solids = {plane_solid(Vec3::Zero(), Vec3::UnitZ())};
+/// What flows, pushed by `force`, between x = 0 and so many layers' height, steady: on a plane, or between two [m^2/s].
+Real layered_flux(SampleSystem& s, int layers, Real nu, Real force, Real friction) {
+  constexpr Real rho = 2600;
+  s.period = Vec2(6 * s.dx, 6 * s.dx);
   s.find();
-  const Real depth = layers * dx;
-  for (Wall& wall : s.walls.walls) wall.friction = s.film.at(depth);
-
+  for (Wall& wall : s.walls.walls) wall.friction = friction;
   // A step so long that nothing but the balance of force and friction is left.
   const Real dt = 1e8;
   const std::vector<Vec3> start(s.size(), Vec3(dt * force, 0, 0));
   std::vector<Vec3> v(s.size(), Vec3::Zero());
   const std::vector<Real> mu(s.size(), rho * nu);
   ViscositySolver solver;
-  ASSERT_TRUE(solver.solve(s.system(), rho, mu, 0, dt, start, 1e-9, 1000, v).converged);
+  EXPECT_TRUE(solver.solve(s.system(), rho, mu, 0, dt, start, 1e-9, 1000, v).converged);
   Real flux = 0;
-  for (const Vec3& u : v) flux += u.x() * dx / 36;
+  for (const Vec3& u : v) flux += u.x() * layers * s.dx / static_cast<Real>(v.size());
+  return flux;
+}
+
+class FilmFrictionTest : public testing::TestWithParam<int> {};
+
+TEST_P(FilmFrictionTest, GivesAFilmOnALatticeTheExactFlux) {
+  const int layers = GetParam();
+  const Real dx = 0.5, nu = 2, force = 1.7, depth = layers * dx;
+  SampleSystem s(lattice_block(6, 6, layers, dx), dx);
+  s.solids = {plane_solid(Vec3::Zero(), Vec3::UnitZ())};
   const Real exact = force * std::pow(depth, 3) / (3 * nu);
-  EXPECT_NEAR(flux, exact, 1e-6 * exact);
+  EXPECT_NEAR(layered_flux(s, layers, nu, force, s.film.film(depth)), exact, 1e-6 * exact);
+}
+
+TEST_P(FilmFrictionTest, GivesAChannelOnALatticeTheExactFlux) {
+  const int layers = GetParam();
+  const Real dx = 0.5, nu = 2, force = 1.7, width = layers * dx;
+  SampleSystem s(lattice_block(6, 6, layers, dx), dx);
+  s.solids = {plane_solid(Vec3::Zero(), Vec3::UnitZ()), plane_solid(Vec3(0, 0, width), -Vec3::UnitZ(), Vec3::Zero(), 1)};
+  const Real exact = force * std::pow(width, 3) / (12 * nu);
+  EXPECT_NEAR(layered_flux(s, layers, nu, force, s.film.channel(width)), exact, 1e-6 * exact);
 }
 
 INSTANTIATE_TEST_SUITE_P(Layers, FilmFrictionTest, testing::Values(1, 2, 3, 4, 5, 6, 10, 12));
@@ -239,11 +252,11 @@ INSTANTIATE_TEST_SUITE_P(Layers, FilmFrictionTest, testing::Values(1, 2, 3, 4, 5
 TEST(FilmFrictionTest, IsLinearBetweenWholeLayersAndConstantOutside) {
   const BoundaryTable table(WendlandC2(1.5), 0.5);
   const FilmFriction film(table, 0.5);
-  EXPECT_EQ(film.at(0.1), film.at(0.5));
-  EXPECT_EQ(film.at(100), film.at(6));
-  EXPECT_NEAR(film.at(0.75), (film.at(0.5) + film.at(1)) / 2, 1e-12);
-  EXPECT_NEAR(film.at(0.5), 2, 0.3) << "one layer feels half of the friction: its docstring";
-  EXPECT_NEAR(film.at(6), 1, 0.05) << "deep films need no help";
+  EXPECT_EQ(film.film(0.1), film.film(0.5));
+  EXPECT_EQ(film.film(100), film.film(6));
+  EXPECT_NEAR(film.film(0.75), (film.film(0.5) + film.film(1)) / 2, 1e-12);
+  EXPECT_NEAR(film.film(0.5), 2, 0.3) << "one layer feels half of the friction: its docstring";
+  EXPECT_NEAR(film.film(6), 1, 0.05) << "deep films need no help";
 }
 
 }  // namespace

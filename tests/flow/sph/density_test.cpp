@@ -66,7 +66,16 @@ TEST_P(FilmShape, GivesItsWallsTheFrictionOfItsDepth) {
   // Told by neighbours near the surface: those must be within sight.
   for (std::size_t i = 0; i < s.size(); ++i) {
     if (s.x[i].z() + s.support < (layers - 0.4) * s.dx) continue;
-    for (const Wall& wall : s.walls[i]) EXPECT_NEAR(wall.friction, s.film.at(layers * s.dx), 2e-3) << s.x[i].z();
+    for (const Wall& wall : s.walls[i]) EXPECT_NEAR(wall.friction, s.film.film(layers * s.dx), 2e-3) << s.x[i].z();
+  }
+}
+
+// Lava above that has no wall in reach sees the surface for them.
+TEST(FilmShapeOfMiddlingDepth, TellsTheDepthToThoseWhoSeeNoSurface) {
+  for (const int layers : {5, 6}) {
+    SampleSystem s = film(layers, 0, 3);
+    shape_of(s);
+    for (const Wall& wall : s.walls.walls) EXPECT_NEAR(wall.friction, s.film.film(layers * s.dx), 2e-3) << layers;
   }
 }
 

@@ -242,6 +242,38 @@ TEST(CollisionMesh, OutOfOverlappingSolidsIsOutOfAllOfThem) {
   EXPECT_NEAR(mesh.signed_distance({0.3, 0.3, 0.25}), -0.75, 1e-12);
 }
 
+// A part that faces inward within a solid is room in it; one that faces outward there, or cuts through another part, is none.
+TEST(CollisionMesh, APartThatFacesInwardWithinASolidIsACavity) {
+  const auto inward = [](TriMesh m) {
+    for (Triangle& t : m.triangles) std::swap(t[1], t[2]);
+    return m;
+  };
+  TriMesh room = make_box({0, 0, 0}, {6, 6, 6});
+  append(room, inward(make_box({1, 1, 1}, {5, 5, 5})));
+  append(room, make_box({2, 2, 2}, {3, 3, 3}));  // and what stands in the room
+  const CollisionMesh mesh(room);
+  EXPECT_EQ(mesh.report().cavities, 1u);
+  EXPECT_EQ(mesh.report().solids, 2u);
+  EXPECT_EQ(mesh.report().turned, 0u);
+  EXPECT_NEAR(mesh.signed_distance({4, 4, 4}), 1, 1e-12);
+  EXPECT_NEAR(mesh.signed_distance({0.5, 3, 3}), -0.5, 1e-12);
+  EXPECT_NEAR(mesh.signed_distance({2.5, 2.5, 2.5}), -0.5, 1e-12);
+  EXPECT_NEAR(mesh.signed_distance({-1, 3, 3}), 1, 1e-12);
+  EXPECT_FALSE(mesh.inside({4, 4, 4}));
+  EXPECT_EQ(mesh.nearest({3, 3, 4.8})->normal.z(), -1);
+  // In its corner three walls are seen.
+  std::array<CollisionMesh::Nearest, 4> walls;
+  EXPECT_EQ(mesh.surroundings({4.7, 4.6, 4.5}, 1, walls), 3u);
+
+  TriMesh cut = make_box({0, 0, 0}, {6, 6, 6});
+  append(cut, inward(make_box({1, 1, 1}, {5, 5, 7})));
+  EXPECT_EQ(CollisionMesh(cut).report().cavities, 0u);
+  EXPECT_LT(CollisionMesh(cut).signed_distance({3, 3, 3}), 0);
+  TriMesh beside = make_box({0, 0, 0}, {6, 6, 6});
+  append(beside, inward(make_box({7, 1, 1}, {8, 5, 5})));
+  EXPECT_EQ(CollisionMesh(beside).report().turned, 1u);
+}
+
 TEST(CollisionMesh, WhatCannotBeAnObstacleIsRefusedWithAReason) {
   TriMesh mesh = make_box({0, 0, 0}, {1, 1, 1});
   mesh.positions[3].x() = std::numeric_limits<Real>::quiet_NaN();
