@@ -88,6 +88,7 @@ class ModernLavaEffect final : public Effect {
   geometry::Points points() const override { return lava_.points(); }
   std::vector<geometry::RigidPose> body_poses() const override { return solids_->poses(); }
   std::vector<SolidPiece> pieces() const override { return solids_->pieces(); }
+  bool makes_pieces() const override { return blocks_.has_value(); }
   Real volume() const override { return lava_.volume(); }
   Real spacing() const override { return lava_.options().spacing; }
   std::size_t memory() const override { return lava_.memory(); }

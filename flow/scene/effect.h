@@ -77,6 +77,8 @@ class Effect {
   virtual std::vector<geometry::RigidPose> body_poses() const { return {}; }
   /// What bodies that can break are made of now, a piece each (whole ones, too), and what else has come.
   virtual std::vector<SolidPiece> pieces() const { return {}; }
+  /// Whether there ever may be pieces that belong to no body of the scene.
+  virtual bool makes_pieces() const { return false; }
   /// Surfaces of its own; their names do not change through a run.
   virtual std::vector<NamedMesh> meshes() const { return {}; }
   virtual std::size_t memory() const = 0;  ///< bytes held

@@ -84,10 +84,13 @@ FrameWriter::Result FrameWriter::write_frame(const flow::Simulation& simulation)
   for (const auto& effect : simulation.effects())
     if (poses.empty()) poses = effect->body_poses();
   std::vector<flow::SolidPiece> pieces;
-  for (const auto& effect : simulation.effects())
+  for (const auto& effect : simulation.effects()) {
+    pieces_ |= effect->makes_pieces();
     for (flow::SolidPiece& piece : effect->pieces()) pieces.push_back(std::move(piece));
+  }
+  const bool moving = pieces_ || solids_.any_moves();
   const geometry::TriMesh solids = solids_.at(simulation.time(), poses, pieces);
-  if (settings_.ply && solids_.any_moves()) skin::write_ply(frames / numbered("obstacles", frame, "ply"), solids, about);
+  if (settings_.ply && moving) skin::write_ply(frames / numbered("obstacles", frame, "ply"), solids, about);
   geometry::TriMesh others = solids;
   for (const auto& effect : simulation.effects())
     for (flow::NamedMesh& own : effect->meshes()) {
@@ -142,7 +145,7 @@ void FrameWriter::write_manifest(int frames_done, const std::vector<std::pair<st
                   {"max", {box.max().x(), box.max().y(), box.max().z()}}};
   if (solids_.any()) m["obstacles"] = {{"files", {"obstacles.ply", "obstacles.glb"}}};
   ordered_json files = ordered_json::object();
-  if (settings_.ply && solids_.any_moves()) files["obstacles"] = "frames/obstacles.####.ply";
+  if (settings_.ply && (pieces_ || solids_.any_moves())) files["obstacles"] = "frames/obstacles.####.ply";
   if (lava_ && settings_.ply) files["ply"] = "frames/skin.####.ply";
   if (lava_ && settings_.obj) files["obj"] = "frames/skin.####.obj";
   if (lava_ && settings_.glb) files["glb"] = "frames/skin.####.glb";
@@ -153,7 +156,7 @@ void FrameWriter::write_manifest(int frames_done, const std::vector<std::pair<st
   m["files"] = files;
   for (const auto& [name, path] : flow) m["flow"][name] = path;
   m["attributes"] = {{"temperature", "K"}, {"velocity", "m/s"}, {"crust", "0 molten .. 1 solid"}, {"region", "id of the particle whose Voronoi region it is, PLY only"}};
-  if (solids_.any_breaks()) {
+  if (pieces_ || solids_.any_breaks()) {
     m["attributes"]["piece"] = "number of a piece for life, from 1; 0: of what cannot break; obstacles only";
     m["attributes"]["inner"] = "1 on faces that breaking has made; obstacles only";
   }

@@ -50,6 +50,7 @@ class FrameWriter {
   const skin::SkinSettings& settings_;
   const geometry::Terrain& terrain_;
   const SolidThings& solids_;
+  bool pieces_ = false;  // an effect makes solid things of its own
   std::filesystem::path folder_;
   bool lava_ = false;  // or bodies alone: no skin
   std::unique_ptr<skin::Preview> preview_;

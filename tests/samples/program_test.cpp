@@ -391,6 +391,36 @@ TEST_F(ProgramTest, RunsBodiesWithoutLavaAndGoesOnToTheSameBytes) {
   ASSERT_EQ(effuse(arguments(parts, "1", {"--force"})).code, 0);
 }
 
+TEST_F(ProgramTest, WhatBreaksIsWrittenInPiecesAndGoesOnToTheSameBytes) {
+  const auto run = [&](const fs::path& out, const char* frames, const Arguments& more = {}) {
+    Arguments all = {"run", kScenes / "fracture.toml", "-o", out, "--frames", frames, "--quiet", "--set", "preview.pictures=false", "--set", "film.time_scale=1"};
+    all.insert(all.end(), more.begin(), more.end());
+    const Outcome outcome = effuse(all);
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+  };
+  const fs::path whole = folder_ / "whole", parts = folder_ / "parts";
+  run(whole, "18");
+  const std::string frame = read_file(whole / "frames" / "obstacles.0018.ply");
+  EXPECT_NE(frame.find("property float piece"), std::string::npos);
+  EXPECT_NE(frame.find("property float inner"), std::string::npos);
+  EXPECT_GT(run_json(whole)["effects"]["bodies"]["pieces"], 5);
+  EXPECT_NE(read_file(whole / "manifest.json").find("\"inner\""), std::string::npos);
+  // Broken off while it breaks.
+  run(parts, "14", {"--threads", "1"});
+  run(parts, "18", {"--resume"});
+  EXPECT_EQ(read_file(parts / "frames" / "obstacles.0018.ply"), frame);
+}
+
+TEST_F(ProgramTest, BlocksOfCrustAreWrittenFromTheFirstFrameOn) {
+  const fs::path out = folder_ / "blocks";
+  const Outcome run = effuse({"run", kScenes / "crust-blocks.toml", "-o", out, "--frames", "2", "--set", "preview.pictures=false", "--set", "lava.spacing=0.8 m", "--set", "lava.crust_blocks.size=3 m"});
+  ASSERT_EQ(run.code, 0) << run.err;
+  EXPECT_TRUE(fs::exists(out / "frames" / "obstacles.0001.ply"));
+  const Outcome misspelt = effuse({"check", kScenes / "crust-blocks.toml", "--set", "lava.crust_blocks.thicknes=1 cm"});
+  EXPECT_EQ(misspelt.code, 2);
+  EXPECT_NE(misspelt.err.find("thickness"), std::string::npos) << misspelt.err;
+}
+
 TEST_F(ProgramTest, TellsBodiesAndJointsOfAScene) {
   const Outcome check = effuse({"check", kScenes / "chain.toml"});
   EXPECT_EQ(check.code, 0) << check.err;
