@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "geometry/base/error.h"
 #include "geometry/mesh/measure.h"
@@ -29,11 +30,14 @@ void add_notes(Lines& lines, const Lines& notes) {
   for (const std::string& note : notes) lines.push_back("note: " + note);
 }
 
-Lines describe_grid(const fs::path& file) {
-  const TerrainImport import = import_terrain(file);
+FileFacts describe_grid(const fs::path& file) {
+  using json = nlohmann::ordered_json;
+  DemGrid grid = import_dem({file});
+  const std::string format = grid.format;
+  const TerrainImport import = terrain_from_grid(std::move(grid), file.string());
   const geometry::HeightField& field = *import.terrain.height_field();
   const geometry::Georeference& georeference = import.terrain.georeference();
-  const Vec2 size(field.spacing().x() * (field.nx() - 1), field.spacing().y() * (field.ny() - 1));
+  const Vec2 size(field.spacing().x() * (field.nx() - 1), field.spacing().y() * (field.ny() - 1)), corner = georeference.origin.head<2>() + field.corner();
   Real low = INFINITY, high = -INFINITY;
   std::size_t holes = 0;
   for (Real z : field.posts()) {
@@ -41,32 +45,53 @@ Lines describe_grid(const fs::path& file) {
     low = std::fmin(low, z);
     high = std::fmax(high, z);
   }
+  const Crs crs = read_crs(georeference.crs, file.string());
+  const Real share = static_cast<Real>(holes) / static_cast<Real>(field.posts().size());
 
-  Lines lines;
+  FileFacts facts;
+  Lines& lines = facts.lines;
   lines.push_back(fmt::format("terrain grid: {} x {} posts, {:.6g} x {:.6g} m apart: {:.6g} x {:.6g} m", field.nx(), field.ny(),
                               field.spacing().x(), field.spacing().y(), size.x(), size.y()));
+  lines.push_back(fmt::format("covers: x {:.10g} to {:.10g}, y {:.10g} to {:.10g}", corner.x(), corner.x() + size.x(), corner.y(), corner.y() + size.y()));
   lines.push_back(fmt::format("heights: {:.6g} to {:.6g} m", low, high));
-  lines.push_back(holes == 0 ? std::string("holes: none")
-                             : fmt::format("holes: {} posts without data ({:.1f} %)", holes,
-                                           100.0 * static_cast<double>(holes) / static_cast<double>(field.posts().size())));
-  lines.push_back("coordinate system: " + to_string(read_crs(georeference.crs, file.string())));
+  lines.push_back(holes == 0 ? std::string("holes: none") : fmt::format("holes: {} posts without data ({:.1f} %)", holes, 100 * share));
+  lines.push_back("coordinate system: " + to_string(crs));
   lines.push_back(
       fmt::format("local origin: {:.0f}, {:.0f}, {:.0f}", georeference.origin.x(), georeference.origin.y(), georeference.origin.z()));
 
+  json deepest = json::array();
   const std::vector<Depression> depressions = closed_depressions(field);
   if (depressions.empty()) {
     lines.push_back("closed depressions: none");
   } else {
-    lines.push_back(fmt::format("closed depressions: {}", depressions.size()));
+    Real volume = 0;
+    for (const Depression& d : depressions) volume += d.volume;
+    lines.push_back(fmt::format("closed depressions: {}, {:.4g} m3", depressions.size(), volume));
     for (std::size_t d = 0; d < std::min<std::size_t>(3, depressions.size()); ++d) {
       const Depression& found = depressions[d];
       lines.push_back(
           fmt::format("  {:.6g} m deep, floor {:.6g} m, spills at {:.6g} m, lowest at local {:.6g}, {:.6g}; {} posts, {:.3g} m3",
                       found.depth(), found.floor, found.spill, found.lowest.x(), found.lowest.y(), found.posts, found.volume));
+      deepest.push_back({{"depth_m", found.depth()}, {"floor_m", found.floor}, {"spill_m", found.spill}, {"lowest_local", {found.lowest.x(), found.lowest.y()}}, {"posts", found.posts}, {"volume_m3", found.volume}});
     }
   }
   add_notes(lines, import.notes);
-  return lines;
+  json values;
+  values["kind"] = "terrain grid";
+  values["format"] = format;
+  values["posts"] = {field.nx(), field.ny()};
+  values["spacing_m"] = {field.spacing().x(), field.spacing().y()};
+  values["covers"] = {{"west", corner.x()}, {"south", corner.y()}, {"east", corner.x() + size.x()}, {"north", corner.y() + size.y()}};
+  values["heights_m"] = {low, high};
+  values["holes"] = holes;
+  values["hole_share"] = share;
+  values["crs"] = {{"title", to_string(crs)}, {"epsg", crs.epsg > 0 ? json(crs.epsg) : json()}, {"wkt", crs.wkt}};
+  values["origin"] = {georeference.origin.x(), georeference.origin.y(), georeference.origin.z()};
+  values["closed_depressions"] = depressions.size();
+  values["deepest"] = deepest;
+  values["notes"] = import.notes;
+  facts.values = values.dump(-1, ' ', false, json::error_handler_t::replace);
+  return facts;
 }
 
 Lines describe_mesh(const fs::path& file) {
@@ -123,10 +148,11 @@ Lines describe_scene(const fs::path& file) {
 
 }  // namespace
 
-std::vector<std::string> describe_file(const fs::path& file) {
-  const std::string extension = lower_extension(file);
-  if (extension == ".toml") return describe_scene(file);
-  return is_dem(file) ? describe_grid(file) : describe_mesh(file);
+FileFacts file_facts(const fs::path& file) {
+  if (lower_extension(file) == ".toml") return {describe_scene(file), ""};
+  return is_dem(file) ? describe_grid(file) : FileFacts{describe_mesh(file), ""};
 }
+
+std::vector<std::string> describe_file(const fs::path& file) { return file_facts(file).lines; }
 
 }  // namespace effuse::importers

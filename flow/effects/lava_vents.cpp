@@ -24,14 +24,14 @@ PlannedVent read_vent(Parameters& p, Real temperature) {
   planned.place = p.place("at");
   if (p.has("from") || p.has("to")) {
     planned.place = p.place("from");
-    planned.from = point("from", true, "one end of a fissure, in the terrain file's coordinates");
+    planned.from = point("from", true, "one end of a fissure, in the terrain's map coordinates");
     planned.to = point("to", true, "its other end");
     point("at", false, "not with a fissure");
     if (p.has("at"))
       p.fault("at",
               "found with 'from' and 'to', wanted one or the other: a crater vent is 'at' a point, a fissure runs 'from' one 'to' another");
   } else {
-    planned.from = planned.to = point("at", true, "centre of a round vent, in the terrain file's coordinates");
+    planned.from = planned.to = point("at", true, "centre of a round vent, in the terrain's map coordinates");
   }
   vent.width = p.number("width", "m", std::nullopt, Parameters::positive(), "width of the fissure, or diameter of the round vent");
   vent.rate = p.number("rate", "m3/s", std::nullopt, Parameters::not_negative(), "volume let out a second");

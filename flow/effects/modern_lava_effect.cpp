@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "flow/effects/crust_blocks.h"
 #include "flow/effects/lava_rheology.h"
 #include "flow/effects/solid_world.h"
 #include "flow/sph/lava_presets.h"
@@ -34,13 +35,15 @@ std::vector<std::string> names(const std::string_view (&list)[N]) {
 
 class ModernLavaEffect final : public Effect {
  public:
-  ModernLavaEffect(const ModernOptions& options, const std::vector<Vent>& vents, const geometry::Terrain& terrain, std::unique_ptr<SolidWorld> solids)
+  ModernLavaEffect(const ModernOptions& options, const std::vector<Vent>& vents, const geometry::Terrain& terrain, std::unique_ptr<SolidWorld> solids, const CrustBlockOptions& blocks)
       : solids_(std::move(solids)),
         lava_(options, vents,
               {[terrain](std::span<const Vec3> x, Real reach, std::span<geometry::Contact> out) { terrain.contacts(x, reach, out); }},
               [terrain](const Vec3& p) { return terrain.height(p.x(), p.y()).has_value(); }, solids_->solids()),
         heat_(options.heat.on),
-        origin_(terrain.georeference().origin) {
+        origin_(terrain.georeference().origin),
+        terrain_(terrain) {
+    if (blocks.on) blocks_.emplace(blocks, options.spacing);
     for (const Vent& vent : vents) {
       if (vent.rate <= 0) continue;
       const Real area = static_cast<Real>(vent.lattice(options.spacing).size()) * options.spacing * options.spacing;
@@ -59,6 +62,7 @@ class ModernLavaEffect final : public Effect {
       throw UnstableError(error.what() + blocked_vents(wanted));
     }
     solids_->wet(lava_.positions(), lava_.options().spacing);
+    if (blocks_) blocks_->step(lava_, *solids_, terrain_);
     Totals& t = totals_;
     t.steps += 1;
     t.retries += last_.retries;
@@ -85,15 +89,18 @@ class ModernLavaEffect final : public Effect {
   void add_to(StateHash& hash) const override {
     lava_.add_to(hash);
     solids_->add_to(hash);
+    if (blocks_) blocks_->add_to(hash);
   }
   void save(StateWriter& out) const override {
     lava_.save(out);
     solids_->save(out);
+    if (blocks_) blocks_->save(out);
     archive(*this, out);
   }
   void load(StateReader& in) override {
     lava_.load(in);
     solids_->load(in);
+    if (blocks_) blocks_->load(in);
     archive(*this, in);
   }
 
@@ -142,6 +149,8 @@ class ModernLavaEffect final : public Effect {
       figures.emplace_back("stopped", t.stopped);
     }
     for (auto& figure : solids_->figures()) figures.push_back(std::move(figure));
+    if (blocks_)
+      for (auto& figure : blocks_->figures()) figures.push_back(std::move(figure));
     return figures;
   }
 
@@ -245,6 +254,8 @@ class ModernLavaEffect final : public Effect {
   ModernLava lava_;
   bool heat_;
   Vec3 origin_;  // of the map
+  geometry::Terrain terrain_;
+  std::optional<CrustBlocks> blocks_;
   std::vector<Opening> openings_;
   ModernReport last_;
   Totals totals_;
@@ -392,15 +403,20 @@ LavaModel read_modern_lava(Parameters& p) {
                                    "max_step or heat.conductivity would do",
                                    std::sqrt(diffusion), std::sqrt(kMostDiffusion)));
 
+  const CrustBlockOptions blocks = read_crust_blocks(p, o.spacing, o.density);
+  if (blocks.on && !(o.heat.on && o.heat.crust)) p.fault("crust_blocks", "need a crust: [lava.heat] with crust = true, or a preset");
+
   LavaModel model;
   model.spacing = o.spacing;
   if (preset) model.vent_temperature = preset->eruption_temperature;
   model.sets_the_step = "max_step, courant, spacing and the vents' rates";
   model.estimate = [o](const std::vector<PlannedVent>& vents, Real duration) { return estimate(o, vents, duration); };
-  model.make = [o](const std::vector<Vent>& vents, const World& world) -> std::unique_ptr<Effect> {
+  model.make = [o, blocks](const std::vector<Vent>& vents, const World& world) -> std::unique_ptr<Effect> {
     ModernOptions options = o;
     options.seed = world.seed;
-    return std::make_unique<ModernLavaEffect>(options, vents, *world.terrain, make_solid_world(world));
+    CrustBlockOptions own = blocks;
+    own.seed = world.seed;
+    return std::make_unique<ModernLavaEffect>(options, vents, *world.terrain, make_solid_world(world, blocks.on), own);
   };
   return model;
 }

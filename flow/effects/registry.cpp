@@ -2,12 +2,14 @@
 
 #include "flow/effects/bodies_effect.h"
 #include "flow/effects/lava.h"
+#include "flow/effects/springs_effect.h"
 
 namespace effuse::flow {
 
 std::span<const EffectKind> effect_kinds() {
   static const EffectKind kinds[] = {
       {"lava", "molten rock on smoothed particles, running over the terrain", read_lava},
+      {"springs", "mass points and springs: jello, cloth, soft solids", read_springs, false, true},
       {"bodies", "rigid bodies, joints and moving obstacles, by themselves where there is no lava", read_bodies_effect, true},
   };
   return kinds;

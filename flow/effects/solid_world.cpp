@@ -2,11 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 
 #include "geometry/base/check.h"
-#include "geometry/base/zones.h"
 
 namespace effuse::flow {
 
@@ -59,7 +57,7 @@ bodies::Joint joint_of(const PlacedJoint& placed, BodyId a, BodyId b) {
 }  // namespace
 
 SolidWorld::SolidWorld(const std::vector<PlacedObstacle>& obstacles, const std::vector<PlacedBody>& bodies, const geometry::Terrain* terrain, const bodies::BodyOptions& options,
-                       const std::vector<PlacedJoint>& joints)
+                       const std::vector<PlacedJoint>& joints, bool births)
     : friction_(1, 1.0) {
   for (const PlacedObstacle& each : obstacles) {
     names_.push_back(fmt::format("obstacle '{}'", each.name));
@@ -67,7 +65,7 @@ SolidWorld::SolidWorld(const std::vector<PlacedObstacle>& obstacles, const std::
     friction_.push_back(each.friction);
     obstacles_.add({each.shape, RigidMotion(each.track.at(0)), each.temperature, static_cast<Index>(tracks_.size())});
   }
-  if (!bodies.empty()) {
+  if (!bodies.empty() || births) {
     bodies_ = std::make_unique<RigidBodies>(options, terrain ? std::optional(*terrain) : std::nullopt);
     for (const PlacedObstacle& each : obstacles) {
       const auto shape = Shape::mesh(each.shape.mesh());
@@ -162,7 +160,7 @@ void SolidWorld::take(std::span<const Movable> movable, Real dt) {
     // Over the whole step, as gravity: an impulse at its begin would let a floating body bob within the step.
     const Vec3 spun = m.spin - bodies_->spin(id);
     const Vec3 force = by_lava / m.inverse_mass / dt, torque = m.inverse_inertia.inverse() * spun / dt;
-    if (look_[b]) {
+    if (breaks(b)) {
       spread(b, force, torque);
     } else {
       bodies_->add_force(id, force, bodies_->centres()[id]);
@@ -234,9 +232,9 @@ void SolidWorld::archive(Self& self, Archive& io) {
 }
 
 sph::SolidOptions SolidWorld::solids() {
-  if (obstacles_.empty()) return {};
+  if (obstacles_.empty() && !has_bodies()) return {};
   sph::SolidOptions options{&obstacles_, {}, friction_};
-  if (brittle_) options.friction_by = [this](Index surface) { return surface < friction_.size() ? friction_[surface] : 1; };
+  if (has_bodies()) options.friction_by = [this](Index surface) { return surface < friction_.size() ? friction_[surface] : 1; };
   bool moves = has_bodies();
   for (const geometry::PoseTrack& track : tracks_) moves = moves || track.keys().size() > 1;
   if (moves) {
@@ -275,6 +273,22 @@ void SolidWorld::add_to(StateHash& hash) const {
 
 void SolidWorld::save(StateWriter& out) const {
   if (!has_bodies()) return;
+  std::vector<Index> block_ids, block_corners;
+  std::vector<Vec3> corners;
+  std::vector<Real> block_numbers;
+  std::vector<std::uint8_t> block_gone;
+  for (const Block& block : blocks_) {
+    block_ids.push_back(block.id);
+    block_corners.push_back(static_cast<Index>(block.corners.size()));
+    corners.insert(corners.end(), block.corners.begin(), block.corners.end());
+    block_numbers.insert(block_numbers.end(), {block.mass, block.temperature});
+    block_gone.push_back(bodies_->is_gone(block.id));
+  }
+  out.array("block_ids", block_ids);
+  out.array("block_counts", block_corners);
+  out.array("block_corners", corners);
+  out.array("block_numbers", block_numbers);
+  out.array("block_gone", block_gone);
   if (brittle_) {
     brittle_->save(out);
     std::vector<Vec3> places;
@@ -293,16 +307,43 @@ void SolidWorld::save(StateWriter& out) const {
 
 void SolidWorld::load(StateReader& in) {
   if (!has_bodies()) return;
+  const auto refuse = [] { throw InputError(Place{}, "the checkpoint holds other rigid bodies"); };
+  std::vector<Index> block_ids, block_corners;
+  std::vector<Vec3> corners;
+  std::vector<Real> block_numbers;
+  std::vector<std::uint8_t> block_gone;
+  in.array("block_ids", block_ids);
+  in.array("block_counts", block_corners);
+  in.array("block_corners", corners);
+  in.array("block_numbers", block_numbers);
+  in.array("block_gone", block_gone);
+  std::size_t all_corners = 0;
+  for (const Index n : block_corners) all_corners += n;
+  if (block_corners.size() != block_ids.size() || block_numbers.size() != 2 * block_ids.size() || block_gone.size() != block_ids.size() || all_corners != corners.size()) refuse();
+  auto corner = corners.begin();
+  for (std::size_t k = 0; k < block_ids.size(); ++k) {
+    blocks_.push_back({block_ids[k], {corner, corner + block_corners[k]}, block_numbers[2 * k], block_numbers[2 * k + 1]});
+    corner += block_corners[k];
+  }
+  std::size_t made = 0;
+  const auto make_block = [&](BodyId id) {
+    if (made == blocks_.size() || blocks_[made].id != id || add_block_body(blocks_[made], {}, Vec3::Zero(), Vec3::Zero()) != id) refuse();
+    ++made;
+  };
+  if (brittle_) brittle_->load(in, make_block);
+  while (made < blocks_.size()) make_block(static_cast<BodyId>(bodies_->size()));
+  admit_pieces();
+  for (std::size_t k = 0; k < blocks_.size(); ++k)
+    if (block_gone[k]) bodies_->retire(blocks_[k].id);
+  admit_pieces();
   if (brittle_) {
-    brittle_->load(in);
-    admit_pieces();
     std::vector<Vec3> places;
     std::vector<Index> counts;
     in.array("body_wet_counts", counts);
     in.array("body_wet", places);
     std::size_t sum = 0;
     for (const Index n : counts) sum += n;
-    if (counts.size() != ids_.size() || sum != places.size()) throw InputError(Place{}, "the checkpoint holds other rigid bodies");
+    if (counts.size() != ids_.size() || sum != places.size()) refuse();
     auto next = places.begin();
     for (std::size_t b = 0; b < counts.size(); ++b) {
       wet_[b].assign(next, next + counts[b]);
@@ -312,119 +353,16 @@ void SolidWorld::load(StateReader& in) {
   bodies_->load(in);
   std::vector<Vec3> acceleration;
   in.array("body_acceleration", acceleration);
-  if (acceleration.size() != ids_.size()) throw InputError(Place{}, "the checkpoint holds other rigid bodies");
+  if (acceleration.size() != ids_.size()) refuse();
   acceleration_ = std::move(acceleration);
   archive(*this, in);
   for (std::size_t b = 0; b < ids_.size(); ++b) before_[b] = bodies_->body_pose(ids_[b]);
   last_dt_ = 0;
 }
 
-/// A body or piece that may break, in the lava's way.
-void SolidWorld::admit(BodyId id, Index parent) {
-  ids_.push_back(id);
-  const bodies::BrittleBodies::Piece& piece = brittle_->pieces().at(id);
-  geometry::TriMesh mesh = geometry::surface_of(*brittle_->material(piece.source).cells, piece.cells);
-  // Obstacles stand in body axes.
-  geometry::TriMesh turned = mesh;
-  for (Vec3& p : turned.positions) p = bodies_->shape(id).body_from_given().world(p);
-  look_.resize(ids_.size());
-  look_.back() = std::make_shared<const geometry::TriMesh>(std::move(mesh));
-  before_.push_back(bodies_->body_pose(id));
-  obstacles_.add({geometry::CollisionMesh(turned), RigidMotion(before_.back()), temperature_.at(parent), static_cast<Index>(tracks_.size() + ids_.size())});
-}
-
-/// Takes in the pieces that have come and lets go of what they were.
-void SolidWorld::admit_pieces() {
-  for (BodyId id = ids_.back() + 1; id < bodies_->size(); ++id) {
-    // One that came and broke in the same step has left its own pieces only; its number stays empty.
-    const bodies::BrittleBodies::Birth& birth = brittle_->birth(id);
-    const Index parent = origin_[static_cast<std::size_t>(std::find(ids_.begin(), ids_.end(), birth.parent) - ids_.begin())];
-    origin_.push_back(parent);
-    names_.push_back(fmt::format("a piece of {}", names_[tracks_.size() + parent]));
-    temperature_.push_back(temperature_[parent]);
-    friction_.push_back(friction_[tracks_.size() + parent + 1]);
-    acceleration_.push_back(bodies_->options().gravity);
-    wet_.emplace_back();
-    if (brittle_->knows(id)) {
-      admit(id, parent);
-    } else {
-      ids_.push_back(id);
-      look_.emplace_back();
-      before_.push_back(bodies_->body_pose(id));
-      const geometry::CollisionMesh mesh(geometry::surface_of(*brittle_->material(birth.source).cells, birth.cells));
-      obstacles_.remove(obstacles_.add({mesh, RigidMotion(before_.back()), 0, static_cast<Index>(tracks_.size() + ids_.size())}));
-    }
-  }
-  for (std::size_t b = 0; b < ids_.size(); ++b)
-    if (gone(b) && look_[b]) {
-      look_[b] = nullptr;
-      wet_[b].clear();
-      obstacles_.remove(tracks_.size() + b);
-    }
-}
-
-void SolidWorld::wet(std::span<const Vec3> x, Real spacing) {
-  if (!brittle_) return;
-  ZONE("solids.wet");
-  for (std::vector<Vec3>& places : wet_) places.clear();
-  Box3 near;
-  for (std::size_t b = 0; b < ids_.size(); ++b)
-    if (look_[b]) near.extend(geometry::placed_box(obstacles_[tracks_.size() + b].motion.to(), obstacles_[tracks_.size() + b].shape.bounds()));
-  if (near.isEmpty()) return;
-  near = Box3(near.min() - Vec3::Constant(spacing), near.max() + Vec3::Constant(spacing));
-  std::vector<Vec3> asked;
-  for (const Vec3& p : x)
-    if (near.contains(p)) asked.push_back(p);
-  constexpr int kMost = 4;
-  std::vector<geometry::Contact> found(asked.size() * kMost);
-  obstacles_.contacts(asked, spacing, kMost, found);
-  for (const geometry::Contact& c : found) {
-    if (!c.any() || c.surface <= tracks_.size()) continue;
-    const std::size_t b = c.surface - tracks_.size() - 1;
-    if (look_[b]) wet_[b].push_back(bodies_->pose(ids_[b]).body(c.point));
-  }
-}
-
-/// Lava's force and torque about the centre, shared out over the places where it lies on the body.
-void SolidWorld::spread(std::size_t b, const Vec3& force, const Vec3& torque) {
-  const BodyId id = ids_[b];
-  const std::vector<Vec3>& places = wet_[b];
-  const RigidPose pose = bodies_->pose(id);
-  const Vec3 centre = bodies_->centres()[id];
-  Vec3 middle = Vec3::Zero();
-  for (const Vec3& p : places) middle += pose.world(p);
-  middle /= std::max<Real>(1, static_cast<Real>(places.size()));
-  Mat3 J = Mat3::Zero();
-  for (const Vec3& p : places) {
-    const Vec3 r = pose.world(p) - middle;
-    J += r.squaredNorm() * Mat3::Identity() - r * r.transpose();
-  }
-  // Places in a line, or too few, carry no moment.
-  const Eigen::SelfAdjointEigenSolver<Mat3> axes(J);
-  const bool wide = places.size() > 2 && axes.eigenvalues()[0] > 1e-6 * axes.eigenvalues()[2];
-  if (!wide) {
-    bodies_->add_force(id, force, centre);
-    bodies_->add_torque(id, torque);
-    return;
-  }
-  const Vec3 a = force / static_cast<Real>(places.size());
-  const Vec3 turn = J.inverse() * (torque - (middle - centre).cross(force));
-  for (const Vec3& p : places) {
-    const Vec3 at = pose.world(p);
-    brittle_->add_force(id, a + turn.cross(at - middle), at);
-  }
-}
-
-std::vector<SolidPiece> SolidWorld::pieces() const {
-  std::vector<SolidPiece> all;
-  for (std::size_t b = 0; b < ids_.size(); ++b)
-    if (look_[b]) all.push_back({static_cast<Index>(b), origin_[b], look_[b], bodies_->pose(ids_[b]), 0});
-  return all;
-}
-
-std::unique_ptr<SolidWorld> make_solid_world(const World& world) {
+std::unique_ptr<SolidWorld> make_solid_world(const World& world, bool births) {
   const auto of = [](const auto* list) { return list ? *list : std::decay_t<decltype(*list)>{}; };
-  return std::make_unique<SolidWorld>(of(world.obstacles), of(world.bodies), world.terrain, body_options(world.body_settings), of(world.joints));
+  return std::make_unique<SolidWorld>(of(world.obstacles), of(world.bodies), world.terrain, body_options(world.body_settings), of(world.joints), births);
 }
 
 }  // namespace effuse::flow

@@ -32,8 +32,19 @@ bodies::BodyOptions body_options(const BodySettings& settings);
 /// force and moment are those of the solves, so that a wall bends under lava that stands against it.
 class SolidWorld {
  public:
+  /// births: bodies may come later (add_block), though there be none yet.
   SolidWorld(const std::vector<PlacedObstacle>& obstacles, const std::vector<PlacedBody>& bodies, const geometry::Terrain* terrain, const bodies::BodyOptions& options = {},
-             const std::vector<PlacedJoint>& joints = {});
+             const std::vector<PlacedJoint>& joints = {}, bool births = false);
+
+  /// A plate of that mass [kg] that came into the world: the convex hull of corners, about the origin of the frame that pose places.
+  /// velocity of its centre of mass.
+  void add_block(std::span<const Vec3> corners, Real mass, const geometry::RigidPose& pose, const Vec3& velocity, const Vec3& spin, Real temperature);
+  std::size_t blocks() const { return blocks_.size(); }
+  /// Of those that are there: centres of mass [m]; their mass [kg].
+  std::vector<Vec3> block_centres() const;
+  Real block_mass() const;
+  /// Takes out blocks whose centre is where `beyond` says; their mass [kg].
+  Real drop_blocks(const std::function<bool(const Vec3&)>& beyond);
 
   /// For ModernLava; refers to this object. No obstacles of any kind: empty.
   sph::SolidOptions solids();
@@ -76,6 +87,14 @@ class SolidWorld {
   void spread(std::size_t body, const Vec3& force, const Vec3& torque);
   void admit_pieces();
   void admit(bodies::BodyId id, Index parent);
+  struct Block {
+    bodies::BodyId id;
+    std::vector<Vec3> corners;
+    Real mass, temperature;
+  };
+  bodies::BodyId add_block_body(const Block& block, const geometry::RigidPose& pose, const Vec3& velocity, const Vec3& spin);
+  void admit_block(const Block& block);
+  bool breaks(std::size_t body) const { return brittle_ && brittle_->knows(ids_[body]); }
   bool gone(std::size_t body) const { return bodies_->is_gone(ids_[body]); }
   template <class Self, class Archive>
   static void archive(Self& self, Archive& io);
@@ -101,9 +120,10 @@ class SolidWorld {
   geometry::Obstacles obstacles_;
   std::unique_ptr<bodies::RigidBodies> bodies_;
   std::unique_ptr<bodies::BrittleBodies> brittle_;  // null: none may break
+  std::vector<Block> blocks_;  // also those that are gone
 };
 
 /// Of the obstacles, bodies and joints of a world, with its settings.
-std::unique_ptr<SolidWorld> make_solid_world(const World& world);
+std::unique_ptr<SolidWorld> make_solid_world(const World& world, bool births = false);
 
 }  // namespace effuse::flow

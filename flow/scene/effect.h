@@ -26,6 +26,14 @@ struct World {
   const std::vector<PlacedBody>* bodies = nullptr;         ///< null: none
   const std::vector<PlacedJoint>* joints = nullptr;        ///< null: none
   BodySettings body_settings = {};
+  /// The mesh that a table's form names, in metres, z up; throws InputError at its place. Empty: there are no files.
+  std::function<geometry::TriMesh(const PlannedForm&)> mesh = {};
+};
+
+/// A surface of one moment, for files (frames/NAME.####.ply) and pictures; "color" is linear light.
+struct NamedMesh {
+  std::string name;
+  geometry::TriMesh mesh;
 };
 
 /// What an effect is expected to cost: for `effuse check`.
@@ -69,6 +77,8 @@ class Effect {
   virtual std::vector<geometry::RigidPose> body_poses() const { return {}; }
   /// What bodies that can break are made of now, a piece each (whole ones, too), and what else has come.
   virtual std::vector<SolidPiece> pieces() const { return {}; }
+  /// Surfaces of its own; their names do not change through a run.
+  virtual std::vector<NamedMesh> meshes() const { return {}; }
   virtual std::size_t memory() const = 0;  ///< bytes held
   virtual void add_to(StateHash& hash) const = 0;
   virtual void save(StateWriter& out) const = 0;
@@ -97,6 +107,8 @@ struct EffectKind {
   EffectPlan (*read)(Parameters& parameters, Real duration);
   /// It steps the scene's bodies and obstacles where no other effect meets them; its table is then there without being written.
   bool of_solids = false;
+  /// A scene may have several: [[name]]. Each plan's own name is then its table's.
+  bool many = false;
 };
 
 }  // namespace effuse::flow

@@ -53,7 +53,7 @@ geometry::TriMesh mesh_of(const PlannedForm& form) {
 
 RigidPose read_pose(Parameters& p, bool required, const RigidPose& fallback) {
   RigidPose pose = fallback;
-  const std::vector<Real> at = p.numbers("position", "m", 3, required, "x, y in the terrain file's coordinates, and z, of the mesh's own origin");
+  const std::vector<Real> at = p.numbers("position", "m", 3, required, "x, y in the terrain's map coordinates, and z, of the mesh's own origin");
   if (at.size() == 3) pose.position = Vec3(at[0], at[1], at[2]);
   const std::vector<Real> angles = p.numbers("rotation", "rad", 3, false, "about x, then y, then z, counter-clockwise");
   if (angles.size() == 3) pose.orientation = turned(angles);

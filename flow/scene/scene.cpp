@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace effuse::flow {
@@ -41,8 +42,17 @@ Scene read_scene(Parameters& root, std::span<const EffectKind> kinds) {
 
   for (const EffectKind& kind : kinds) {
     if (kind.of_solids || !root.has(kind.name)) continue;
-    Parameters table = root.table(kind.name, kind.what);
-    scene.effects.push_back(kind.read(table, scene.frame_time(scene.frames)));
+    if (!kind.many) {
+      Parameters table = root.table(kind.name, kind.what);
+      scene.effects.push_back(kind.read(table, scene.frame_time(scene.frames)));
+      continue;
+    }
+    for (Parameters& table : root.tables(kind.name, kind.what)) {
+      EffectPlan plan = kind.read(table, scene.frame_time(scene.frames));
+      if (std::any_of(scene.effects.begin(), scene.effects.end(), [&](const EffectPlan& other) { return other.name == plan.name; }))
+        table.fault("name", fmt::format("'{}' is the name of another effect, wanted one of its own: files are called by it", plan.name));
+      scene.effects.push_back(std::move(plan));
+    }
   }
   if (scene.effects.empty() && !(scene.obstacles.empty() && scene.bodies.empty())) {
     const Node nothing;

@@ -15,6 +15,7 @@ TerrainSettings read_terrain_settings(Parameters& root) {
     if (size.size() == 2 && !(s.plane->size.minCoeff() >= 1e-2 && s.plane->size.maxCoeff() <= 1e6)) plane.fault("size", "must be from 0.01 to 1e6 m");
     s.plane->slope = plane.number("slope", "rad", 0, {0, 1.5}, "of the ground");
     s.plane->downhill = plane.number("downhill", "rad", 0, {}, "the way it falls, counter-clockwise from east");
+    s.plane->height = plane.number("height", "m", 0, {}, "at the origin");
     s.temperature = terrain.number("temperature", "K", s.temperature, {0, 5000, true}, "of the ground");
     if (terrain.has("file")) {
       terrain.text("file", "", "");

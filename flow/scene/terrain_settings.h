@@ -12,6 +12,7 @@ namespace effuse::flow {
 struct PlannedPlane {
   Vec2 size = Vec2::Zero();      ///< [m]
   Real slope = 0, downhill = 0;  ///< [rad]
+  Real height = 0;               ///< at the origin [m]
 };
 
 /// What a scene says of its ground, as written: the importers know what to do with it.

@@ -79,6 +79,7 @@ struct ModernLava::Impl {
   Heat heat;
   Real time = 0, acceleration = 0;      // largest, of the last step
   Real rested = 0;                      // [s] that heat lies behind; 0 while anybody is awake
+  std::uint64_t taken = 0;              // particles
   Real left_enthalpy = 0;               // [J] of all that left
   // Not in a report yet: what add() had heat catch up on, and those that left before a step that failed.
   HeatBudget owed;
@@ -190,6 +191,7 @@ struct ModernLava::Impl {
     io.value("time", self.time);
     io.value("acceleration", self.acceleration);
     io.value("rested", self.rested);
+    io.value("taken", self.taken);
     io.value("left_enthalpy", self.left_enthalpy);
     io.value("owed_radiated", self.owed.radiated);
     io.value("owed_convected", self.owed.convected);
@@ -693,6 +695,26 @@ void ModernLava::add(std::span<const Vec3> x, std::span<const Vec3> v, std::span
   }
 }
 
+Real ModernLava::take(std::span<const Index> which) {
+  Impl& m = *impl_;
+  std::vector<Index> stay;
+  std::size_t next = 0;
+  Real enthalpy = 0;
+  for (Index i = 0; i < m.size(); ++i) {
+    if (next == which.size() || which[next] != i) {
+      stay.push_back(i);
+      continue;
+    }
+    enthalpy += m.mass * m.heat.enthalpy()[i];
+    ++next;
+  }
+  CHECK_EQ(next, which.size());
+  m.keep(stay);
+  m.taken += which.size();
+  m.set = {};  // of the last step, by numbers that have moved
+  return enthalpy;
+}
+
 ModernReport ModernLava::step(Real dt_max) { return impl_->step(dt_max); }
 Real ModernLava::time() const { return impl_->time; }
 std::size_t ModernLava::size() const { return impl_->size(); }
@@ -700,6 +722,7 @@ const ModernOptions& ModernLava::options() const { return impl_->o; }
 Real ModernLava::particle_mass() const { return impl_->mass; }
 Real ModernLava::volume() const { return impl_->volume * static_cast<Real>(size()); }
 Real ModernLava::mass_emitted() const { return impl_->mass * static_cast<Real>(impl_->census.emitted()); }
+Real ModernLava::mass_taken() const { return impl_->mass * static_cast<Real>(impl_->taken); }
 Real ModernLava::mass_left() const { return impl_->mass * static_cast<Real>(impl_->census.left()); }
 std::span<const Vec3> ModernLava::positions() const { return impl_->x; }
 std::span<const Vec3> ModernLava::velocities() const { return impl_->v; }

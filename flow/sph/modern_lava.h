@@ -106,6 +106,10 @@ class ModernLava {
   /// Adds particles, pressure 0; ids follow on. All finite (checked).
   void add(std::span<const Vec3> x, std::span<const Vec3> v, std::span<const Real> temperature);
 
+  /// Takes particles out, rising numbers (checked), for what becomes of them elsewhere. The heat [J] that went with them; they count
+  /// neither as present nor as left (mass_taken). Numbers of those behind move up.
+  Real take(std::span<const Index> which);
+
   /// One step of at most dt_max [s] > 0. A step whose viscosity solve fails (stays above ten times the tolerance), whose result is not finite,
   /// or which moves a particle by more than half a spacing is undone and tried with half the size, eight times and down to min_step; then
   /// UnstableError, the particles where they were. UnstableError, too, when speed or acceleration leave less than min_step.
@@ -118,6 +122,7 @@ class ModernLava {
   Real volume() const;         ///< [m^3]
   Real mass_emitted() const;   ///< by vents and add() [kg]
   Real mass_left() const;      ///< over the ground's edge [kg]
+  Real mass_taken() const;     ///< by take() [kg]
 
   /// Views, valid until the next step.
   std::span<const Vec3> positions() const;

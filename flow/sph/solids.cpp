@@ -130,10 +130,12 @@ void Solids::stand(Real time, Real dt) {
     options_.stand(time, dt);
   } else {
     options_.move(time, time + dt);
-    for (std::size_t i = 0; i < all.size(); ++i) all.move(i, all[i].motion.turned_back());
+    for (std::size_t i = 0; i < all.size(); ++i)
+      if (all.holds(i)) all.move(i, all[i].motion.turned_back());
     all.update();
   }
   for (std::size_t i = 0; i < all.size(); ++i) {
+    if (!all.holds(i)) continue;
     const geometry::RigidMotion& motion = all[i].motion;
     if (!motion.moves() || motion.duration() == 0) continue;
     // Around the frame's origin no point of the shape is farther out than its box's corners.
@@ -146,7 +148,7 @@ void Solids::stand(Real time, Real dt) {
 void Solids::rest() {
   geometry::Obstacles& all = *options_.obstacles;
   for (std::size_t i = 0; i < all.size(); ++i)
-    if (all[i].motion.moves()) all.move(i, geometry::RigidMotion(all[i].motion.to()));
+    if (all.holds(i) && all[i].motion.moves()) all.move(i, geometry::RigidMotion(all[i].motion.to()));
   all.update();
 }
 

@@ -72,6 +72,8 @@ void Obstacles::update() {
 std::size_t Obstacles::size() const { return impl_->all.size(); }
 bool Obstacles::empty() const { return impl_->left == 0; }
 
+bool Obstacles::holds(std::size_t i) const { return i < size() && impl_->all[i].has_value(); }
+
 const Obstacle& Obstacles::operator[](std::size_t i) const {
   CHECK_LT(i, size());
   CHECK(impl_->all[i].has_value());

@@ -44,7 +44,8 @@ class Obstacles {
 
   std::size_t size() const;   ///< removed ones included
   bool empty() const;         ///< none is left
-  const Obstacle& operator[](std::size_t i) const;
+  bool holds(std::size_t i) const;  ///< has not been removed
+  const Obstacle& operator[](std::size_t i) const;  ///< one it holds (checked)
   Box3 bounds() const;        ///< of everything at the step's end; empty box: no obstacles
   Box3 swept_bounds() const;  ///< of everything on all of its way
 

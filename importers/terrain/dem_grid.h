@@ -16,6 +16,7 @@ struct DemGrid {
   int nx = 0, ny = 0;              ///< >= 2
   std::vector<Real> z;             ///< nx * ny heights [m], i fastest, south row first; NaN: a hole
   std::size_t nodata = 0;          ///< how many are holes
+  std::string format;              ///< of the first file: "GeoTIFF, Int16"
   std::string crs;                 ///< WKT or an authority's code; empty: unknown
   std::vector<std::string> notes;  ///< for people: what was found, assumed and changed
 };

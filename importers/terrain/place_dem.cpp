@@ -100,6 +100,7 @@ class Placement {
       sources_.emplace_back(file, options, read_text);
       const std::string of = files.size() > 1 ? file.filename().string() + ": " : "";
       const RasterFacts& facts = sources_.back().facts();
+      if (grid_.format.empty()) grid_.format = fmt::format("{}, {}", facts.format, facts.type);
       if (facts.type != "text") note(fmt::format("{}{}, {}, {} x {} cells", of, facts.format, facts.type, facts.frame.columns, facts.frame.rows));
       for (const std::string& text : facts.notes) note(of + text);
     }

@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "geometry/base/files.h"
 #include "geometry/base/zones.h"
+#include "geometry/procedural/primitives.h"
 #include "skin/color/lava_color.h"
 #include "skin/preview/preview.h"
 #include "skin/surface/level_set.h"
@@ -86,8 +88,17 @@ FrameWriter::Result FrameWriter::write_frame(const flow::Simulation& simulation)
     for (flow::SolidPiece& piece : effect->pieces()) pieces.push_back(std::move(piece));
   const geometry::TriMesh solids = solids_.at(simulation.time(), poses, pieces);
   if (settings_.ply && solids_.any_moves()) skin::write_ply(frames / numbered("obstacles", frame, "ply"), solids, about);
+  geometry::TriMesh others = solids;
+  for (const auto& effect : simulation.effects())
+    for (flow::NamedMesh& own : effect->meshes()) {
+      if (std::find(meshes_.begin(), meshes_.end(), own.name) == meshes_.end()) meshes_.push_back(own.name);
+      if (settings_.ply) skin::write_ply(frames / numbered(own.name.c_str(), frame, "ply"), own.mesh, about, skin::PlyPositions::kDouble);
+      if (!preview_) continue;
+      if (others.positions.empty()) others = std::move(own.mesh);
+      else geometry::append(others, own.mesh);
+    }
   if (preview_) {
-    const skin::Image image = preview_->render(in_one_picture(mesh, solids), skin::picture_at(settings_, terrain_, frame / scene_.fps));
+    const skin::Image image = preview_->render(in_one_picture(mesh, others), skin::picture_at(settings_, terrain_, frame / scene_.fps));
     skin::write_png(folder_ / "preview" / numbered("preview", frame, "png"), image);
   }
   return result;
@@ -136,6 +147,8 @@ void FrameWriter::write_manifest(int frames_done, const std::vector<std::pair<st
   if (lava_ && settings_.obj) files["obj"] = "frames/skin.####.obj";
   if (lava_ && settings_.glb) files["glb"] = "frames/skin.####.glb";
   if (lava_ && settings_.vdb) files["vdb"] = "frames/lava.####.vdb";
+  for (const std::string& name : meshes_)
+    if (settings_.ply) files[name] = fmt::format("frames/{}.####.ply", name);
   if (settings_.preview) files["preview"] = "preview/preview.####.png";
   m["files"] = files;
   for (const auto& [name, path] : flow) m["flow"][name] = path;

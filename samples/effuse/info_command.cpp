@@ -97,12 +97,12 @@ std::vector<std::string> describe_run(const fs::path& folder) {
   return lines;
 }
 
-std::vector<std::string> describe(const fs::path& file) {
+importers::FileFacts describe(const fs::path& file) {
   std::error_code ignored;  // a link to itself, a name too long: the reader says so
-  if (const std::optional<fs::path> run = run_of(file)) return describe_run(*run);
+  if (const std::optional<fs::path> run = run_of(file)) return {describe_run(*run), ""};
   if (fs::is_directory(file, ignored)) throw InputError(Place{file.string()}, "is a folder that holds no run (no manifest.json), wanted a file or the folder of a run");
-  if (file.extension() == ".vdb") return skin::describe_vdb(file);
-  return importers::describe_file(file);
+  if (file.extension() == ".vdb") return {skin::describe_vdb(file), ""};
+  return importers::file_facts(file);
 }
 }  // namespace
 
@@ -111,8 +111,10 @@ ExitCode info(const std::vector<fs::path>& files, const CommonOptions& common) {
   std::vector<Fault> faults;
   for (const fs::path& file : files) {
     try {
-      const std::vector<std::string> lines = describe(file);
+      const importers::FileFacts facts = describe(file);
+      const std::vector<std::string>& lines = facts.lines;
       j.push_back({{"file", file.string()}, {"facts", lines}});
+      if (!facts.values.empty()) j.back()["values"] = nlohmann::ordered_json::parse(facts.values);
       if (common.json) continue;
       fmt::print("{}\n", file.string());
       for (const std::string& line : lines) fmt::print("  {}\n", line);

@@ -8,8 +8,10 @@
 #include "geometry/terrain/plane.h"
 #include "geometry/base/hash.h"
 #include "geometry/base/zones.h"
+#include "importers/scene/jello_scene.h"
 #include "importers/scene/scene_file.h"
 #include "importers/terrain/import_terrain.h"
+#include "importers/worlds/jello_world.h"
 #include "samples/effuse/flow_writer.h"
 #include "samples/effuse/misspelt.h"
 #include "samples/effuse/solid_things.h"
@@ -19,7 +21,7 @@ namespace effuse {
 
 namespace {
 /// The tables that decide the state of frame n, whatever the number of frames and the files made of it.
-std::string state_key(const flow::Node& resolved, const geometry::Terrain& terrain, const SolidThings& solids) {
+std::string state_key(const flow::Node& resolved, const geometry::Terrain& terrain, const SolidThings& solids, const flow::Simulation& start) {
   StateHash hash;
   for (const auto& [name, value] : resolved.entries) {
     if (name == "skin" || name == "output" || name == "preview" || name == "name") continue;
@@ -28,7 +30,7 @@ std::string state_key(const flow::Node& resolved, const geometry::Terrain& terra
     if (name == "film") copy.set("frames", flow::Node{});
     // What files hold counts, not where they lie.
     if (name == "terrain") copy.set("file", flow::Node{});
-    if (name == "obstacle" || name == "body")
+    if (name == "obstacle" || name == "body" || name == "springs")
       for (flow::Node& one : copy.items) one.set("file", flow::Node{});
     hash.add(importers::to_toml(part));
   }
@@ -37,13 +39,14 @@ std::string state_key(const flow::Node& resolved, const geometry::Terrain& terra
   hash.add(std::span<const Vec3>(terrain.mesh().positions));
   hash.add(terrain.georeference().origin.x());
   hash.add(terrain.georeference().origin.y());
+  hash.add(start.state_hash());
   return hash.hex();
 }
 }  // namespace
 
 std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const std::vector<std::string>& overrides, int frames) {
   ZONE("load");
-  flow::Node node = importers::read_scene_file(file);
+  flow::Node node = file.extension() == ".w" ? importers::jello_scene(importers::read_jello_world(file), file) : importers::read_scene_file(file);
   for (const std::string& assignment : overrides) importers::apply_override(node, assignment);
   if (frames > 0) importers::apply_override(node, "film.frames=" + std::to_string(frames));
 
@@ -72,7 +75,7 @@ std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const
     }
   }
   if (const auto& plane = scene.terrain.plane; plane && plane->size.minCoeff() > 0) {
-    loaded->terrain = geometry::Terrain::from_height_field(geometry::make_plane(plane->size, plane->slope, plane->downhill), {}, scene.terrain.temperature);
+    loaded->terrain = geometry::Terrain::from_height_field(geometry::make_plane(plane->size, plane->slope, plane->downhill, 32, plane->height), {}, scene.terrain.temperature);
     loaded->notes.push_back(fmt::format("plane of {:g} x {:g} m, slope {:.3g} deg", plane->size.x(), plane->size.y(), plane->slope * 180 / kPi));
   }
   if (loaded->terrain) {
@@ -82,7 +85,10 @@ std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const
     if (solids.obstacles.size() == scene.obstacles.size() && solids.bodies.size() == scene.bodies.size())
       solids.joints = load_joints(scene, solids.obstacles, solids.bodies, *loaded->terrain, faults, loaded->notes);
   }
-  const auto world = [&] { return flow::World{&*loaded->terrain, scene.seed, &loaded->solids.obstacles, &loaded->solids.bodies, &loaded->solids.joints, scene.body_settings}; };
+  const auto world = [&] {
+    return flow::World{&*loaded->terrain, scene.seed, &loaded->solids.obstacles, &loaded->solids.bodies, &loaded->solids.joints, scene.body_settings,
+                       [&](const flow::PlannedForm& form) { return load_form(form, file.parent_path()); }};
+  };
   if (!faults.empty() && loaded->terrain) {
     for (const flow::EffectPlan& plan : scene.effects)
       for (const Fault& fault : plan.misfits(world())) faults.push_back(fault);
@@ -107,12 +113,12 @@ std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const
         for (const std::filesystem::path& path : terrain_paths) files.items.push_back(whole(std::filesystem::absolute(path).lexically_normal()));
         table.set("file", files.items.size() == 1 ? files.items.front() : files);
       }
-      if (name != "obstacle" && name != "body") continue;
+      if (name != "obstacle" && name != "body" && name != "springs") continue;
       for (flow::Node& one : table.items)
         if (const flow::Node* path = one.find("file"); path && !path->text.empty()) one.set("file", whole(std::filesystem::absolute(file.parent_path() / path->text).lexically_normal()));
     }
     loaded->resolved = importers::to_toml(resolved);
-    loaded->key = state_key(resolved, *loaded->terrain, loaded->solids);
+    loaded->key = state_key(resolved, *loaded->terrain, loaded->solids, *loaded->simulation);
   }
   if (!faults.empty()) {
     std::vector<std::string> effects;

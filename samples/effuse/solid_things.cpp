@@ -14,17 +14,22 @@ namespace effuse {
 namespace {
 constexpr float kAir = 288;  // [K]
 
-/// The mesh of a plan: its file's, relative to the scene's folder, or its box or ball.
-geometry::TriMesh mesh_of(const flow::PlannedForm& form, const std::filesystem::path& folder) {
-  if (form.file.empty()) return flow::mesh_of(form);
-  const std::filesystem::path path = std::filesystem::path(form.file).is_relative() ? folder / form.file : std::filesystem::path(form.file);
-  return importers::import_mesh(path).mesh;
-}
-
 /// One without a form has been told of.
 bool has_form(const flow::PlannedForm& form) { return !form.file.empty() || form.ball > 0 || form.box.minCoeff() > 0; }
 
 }  // namespace
+
+geometry::TriMesh load_form(const flow::PlannedForm& form, const std::filesystem::path& folder) {
+  if (form.file.empty()) return flow::mesh_of(form);
+  const std::filesystem::path path = std::filesystem::path(form.file).is_relative() ? folder / form.file : std::filesystem::path(form.file);
+  try {
+    return importers::import_mesh(path).mesh;
+  } catch (const InputError& error) {
+    std::vector<Fault> faults;
+    for (const Fault& fault : error.faults()) faults.push_back({form.file_place, to_string(fault)});
+    throw InputError(faults);
+  }
+}
 
 std::vector<flow::PlacedObstacle> load_obstacles(const flow::Scene& scene, const std::filesystem::path& folder, const geometry::Terrain& terrain, std::vector<Fault>& faults,
                                                  std::vector<std::string>& notes) {
@@ -33,10 +38,10 @@ std::vector<flow::PlacedObstacle> load_obstacles(const flow::Scene& scene, const
     if (!has_form(plan)) continue;
     try {
       const std::size_t before = placed.size();
-      flow::place_obstacle(plan, mesh_of(plan, folder), terrain, placed, faults);
+      flow::place_obstacle(plan, load_form(plan, folder), terrain, placed, faults);
       if (placed.size() > before) notes.push_back(fmt::format("obstacle '{}': {}", plan.name, geometry::to_string(placed.back().shape.report())));
     } catch (const InputError& error) {
-      for (const Fault& fault : error.faults()) faults.push_back({plan.file_place, to_string(fault)});
+      faults.insert(faults.end(), error.faults().begin(), error.faults().end());
     }
   }
   return placed;
@@ -51,7 +56,7 @@ std::vector<flow::PlacedBody> load_bodies(const flow::Scene& scene, const std::f
     if (!has_form(plan)) continue;
     try {
       const std::size_t before = placed.size();
-      flow::place_body(plan, mesh_of(plan, folder), terrain, placed, faults);
+      flow::place_body(plan, load_form(plan, folder), terrain, placed, faults);
       if (placed.size() == before) continue;
       const std::string what = fmt::format("{:.4g} m3, {:.4g} kg{}", placed.back().volume, placed.back().volume * plan.density,
                                            placed.back().cells ? fmt::format(", {} cells, breaks at {:.4g} Pa", placed.back().cells->cells.size(), placed.back().strength) : "");
@@ -63,7 +68,7 @@ std::vector<flow::PlacedBody> load_bodies(const flow::Scene& scene, const std::f
       }
     } catch (const InputError& error) {
       for (const Fault& fault : error.faults())
-        if (faults.empty() || to_string(faults.back()) != to_string(Fault{plan.file_place, to_string(fault)})) faults.push_back({plan.file_place, to_string(fault)});
+        if (faults.empty() || to_string(faults.back()) != to_string(fault)) faults.push_back(fault);
     }
   }
   return placed;

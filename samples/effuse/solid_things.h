@@ -12,6 +12,9 @@
 
 namespace effuse {
 
+/// The mesh that a form names, its file's relative to the scene's folder, or its box or ball. Throws InputError at the scene's line.
+geometry::TriMesh load_form(const flow::PlannedForm& form, const std::filesystem::path& folder);
+
 /// Reads the meshes of a scene's obstacles, relative to its folder, and puts them on the terrain. What goes wrong is a fault at the
 /// line that names the file. notes: what was done to meshes on the way, a line each.
 std::vector<flow::PlacedObstacle> load_obstacles(const flow::Scene& scene, const std::filesystem::path& folder, const geometry::Terrain& terrain, std::vector<Fault>& faults,

@@ -23,12 +23,12 @@ void read_camera(flow::Parameters& preview, SkinSettings& s) {
   s.elevation = preview.number("elevation", "rad", 0.5, {-0.2, 1.5}, "of the camera above the horizon");
   s.turn = preview.number("turn", "rad/s", 0, {}, "of the camera round its target, by seconds of film");
   s.field_of_view = preview.number("fov", "rad", s.field_of_view, {0.02, 2.5}, "field of view from the picture's bottom to its top");
-  s.view = preview.numbers("view", "m", 3, false, "x, y in the terrain file's coordinates and radius of what the camera frames; absent: target, or all the terrain");
+  s.view = preview.numbers("view", "m", 3, false, "x, y in the terrain's map coordinates and radius of what the camera frames; absent: target, or all the terrain");
   if (s.view.size() == 3) {
     if (!(s.view[2] >= kNearest && s.view[2] <= kFarthest)) preview.fault("view", fmt::format("the radius, third number, is {}, must be from 0.001 to 1e7 m", s.view[2]));
     if (off_the_map(s.view)) preview.fault("view", "lies more than 1e8 m from the origin of the map");
   }
-  s.target = preview.numbers("target", "m", 0, false, "x, y in the terrain file's coordinates of what the camera looks at, on the ground, or x, y, z; goes with distance, not with view");
+  s.target = preview.numbers("target", "m", 0, false, "x, y in the terrain's map coordinates of what the camera looks at, on the ground, or x, y, z; goes with distance, not with view");
   s.camera_place = preview.place("target");
   // Nothing stands for it: a resolved scene has it with its target only.
   if (preview.has("distance") || preview.has("target")) s.distance = preview.number("distance", "m", std::nullopt, {kNearest, kFarthest}, "of the camera from its target");

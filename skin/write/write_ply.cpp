@@ -69,7 +69,7 @@ void check_labels(const RegionLabels& labels, const TriMesh& mesh) {
 
 constexpr const char* kRegionNames[] = {"region", "region_high"};
 
-void write(const std::filesystem::path& file, const TriMesh& mesh, const RegionLabels* labels, const Metadata& metadata) {
+void write(const std::filesystem::path& file, const TriMesh& mesh, const RegionLabels* labels, const Metadata& metadata, PlyPositions precision) {
   ZONE("write.ply");
   require_well_formed(file.string(), mesh);
   if (labels) check_labels(*labels, mesh);
@@ -85,10 +85,12 @@ void write(const std::filesystem::path& file, const TriMesh& mesh, const RegionL
   if (regions.beyond_float) out += "comment region: whole numbers above 2^24, which readers that keep them as float round\n";
   out += fmt::format("element vertex {}\n", n);
   std::set<std::string> taken;
-  for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) {
-    out += fmt::format("property float {}\n", name);
+  const bool exact = precision == PlyPositions::kDouble;
+  for (const std::string name : {"x", "y", "z", "nx", "ny", "nz"}) {
+    out += fmt::format("property {} {}\n", exact && name.size() == 1 ? "double" : "float", name);
     taken.insert(name);
   }
+  if (exact) layout.stride += 3 * (sizeof(double) - sizeof(float));
   layout.color = find_color(mesh);
   if (layout.color) {
     out += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
@@ -130,7 +132,8 @@ void write(const std::filesystem::path& file, const TriMesh& mesh, const RegionL
       to += size;
     };
     const Eigen::Vector3f position = mesh.positions[i].cast<float>(), normal = normals[i].cast<float>();
-    put(position.data(), 3 * sizeof(float));
+    if (exact) put(mesh.positions[i].data(), 3 * sizeof(double));
+    else put(position.data(), 3 * sizeof(float));
     put(normal.data(), 3 * sizeof(float));
     if (layout.color)
       for (std::size_t k = 0; k < 3; ++k) *to++ = static_cast<char>(srgb(layout.color->values[3 * i + k]));
@@ -151,10 +154,12 @@ void write(const std::filesystem::path& file, const TriMesh& mesh, const RegionL
 
 }  // namespace
 
-void write_ply(const std::filesystem::path& file, const TriMesh& mesh, const Metadata& metadata) { write(file, mesh, nullptr, metadata); }
+void write_ply(const std::filesystem::path& file, const TriMesh& mesh, const Metadata& metadata, PlyPositions positions) {
+  write(file, mesh, nullptr, metadata, positions);
+}
 
 void write_skin_ply(const std::filesystem::path& file, const TriMesh& mesh, const RegionLabels& labels, const Metadata& metadata) {
-  write(file, mesh, &labels, metadata);
+  write(file, mesh, &labels, metadata, PlyPositions::kFloat);
 }
 
 }  // namespace effuse::skin

@@ -27,6 +27,12 @@ TEST(DescribeFile, AVolcanoIsAGridWithOneDeepCrater) {
   EXPECT_TRUE(contains(text, "20 m deep, floor 148 m, spills at 168 m")) << text;
 }
 
+TEST(DescribeFile, AGridTellsTheSameToPrograms) {
+  const std::string values = file_facts(EFFUSE_SOURCE_DIR "/samples/scenes/maunga-whau.asc").values;
+  for (const char* part : {"\"posts\":[61,87]", "\"spacing_m\":[10.0,10.0]", "\"heights_m\":[94.0,195.0]", "\"hole_share\":0.0", "\"epsg\":27200", "\"west\":2667405.0", "\"depth_m\":20.0", "ESRI ASCII grid"})
+    EXPECT_TRUE(contains(values, part)) << part << " in " << values;
+}
+
 TEST(DescribeFile, AMeshTellsVolumeOnlyWhenItEnclosesOne) {
   const TestFolder folder;
   const std::string corners = "v 0 0 0\nv 2 0 0\nv 0 3 0\nv 0 0 4\n";

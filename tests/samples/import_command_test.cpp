@@ -16,6 +16,7 @@
 #include "importers/terrain/import_dem.h"
 #include "importers/terrain/import_terrain.h"
 #include "samples/effuse/commands.h"
+#include "samples/effuse/load_scene.h"
 
 namespace effuse {
 namespace {
@@ -152,6 +153,27 @@ TEST_F(ImportCommandTest, AMeshGoesThroughInALocalFrame) {
   EXPECT_EQ(mesh.positions[0], Vec3(0.5, 0.25, 100));
   c.max_error = "1 m";
   EXPECT_NE(refused(c).find("is for grids"), std::string::npos);
+}
+
+TEST_F(ImportCommandTest, ASceneTakesAMosaicAndItsOptions) {
+  ImportCommand half = command(kWhau, "south.tif");
+  half.crop = {2667400, 6478700, 2668010, 6479135};
+  run(half);
+  half = command(kWhau, "north.tif");
+  half.crop = {2667400, 6479135, 2668010, 6479570};
+  run(half);
+  const std::string scene = "[film]\nframes = 2\n[terrain]\nfile = [\"south.tif\", \"north.tif\"]\npits = \"fill\"\ncrop = [2667500, 6478800, 2667900, 6479300]\n[lava]\nspacing = 4\n[[lava.vent]]\nat = [2667700, 6479200]\nwidth = 12\nrate = 30\n";
+  write_file(folder_ / "scene.toml", scene);
+  const std::unique_ptr<LoadedScene> loaded = load_scene(folder_ / "scene.toml", {}, 0);
+  const geometry::HeightField& field = *loaded->terrain->height_field();
+  EXPECT_EQ(field.nx(), 40);
+  EXPECT_EQ(field.ny(), 50);
+  EXPECT_EQ(loaded->terrain->georeference().origin, Vec3(2667505, 6478805, 0));
+  EXPECT_EQ(field.height(2667675 - 2667505, 6478995 - 6478805), 168) << "the crater is filled to where it spills";
+  // As resolved it is the same ground from elsewhere.
+  fs::create_directories(folder_ / "elsewhere");
+  write_file(folder_ / "elsewhere" / "scene.toml", loaded->resolved);
+  EXPECT_EQ(load_scene(folder_ / "elsewhere" / "scene.toml", {}, 0)->key, loaded->key);
 }
 
 TEST_F(ImportCommandTest, TheProgramTakesItsOptions) {

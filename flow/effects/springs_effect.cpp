@@ -1,0 +1,388 @@
+#include "flow/effects/springs_effect.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "flow/scene/placing.h"
+#include "flow/springs/builders.h"
+#include "flow/springs/spring_system.h"
+#include "geometry/base/error.h"
+#include "geometry/base/parallel.h"
+#include "geometry/collide/obstacles.h"
+#include "geometry/mesh/measure.h"
+
+namespace effuse::flow {
+
+namespace {
+
+using springs::SpringBody;
+using springs::SpringState;
+using springs::SpringSystem;
+
+constexpr Real kSafety = 0.5;      // share of the longest stable step that a step takes
+constexpr int kHalvings = 10;      // of a step that went bad
+constexpr Real kImplicitStep = 1. / 240;  // [s]: longer ones are stable, and dull
+constexpr float kJellyColor[] = {0.55f, 0.08f, 0.05f}, kClothColor[] = {0.08f, 0.16f, 0.45f};  // linear light
+
+struct Pin {
+  Vec3 at;
+  Real radius;
+};
+
+/// The table, read.
+struct SpringsSettings {
+  std::string name;
+  enum class Shape { kCube, kCloth, kSolid } shape = Shape::kCube;
+  PlannedForm form;
+  int points = 8;
+  Real size = 1, spacing = 0, density = 0, mass = 0;
+  springs::SpringMaterial material, bend;
+  geometry::RigidPose pose;
+  bool on_ground = true;
+  Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero();
+  std::vector<Vec3> positions, velocities;
+  std::vector<Pin> pins;
+  std::string pinned_to;
+  springs::Surroundings around;
+  geometry::ForceGrid field;
+  bool meets = true;
+  Real thickness = 0;
+  Scheme scheme = Scheme::kSymplecticEuler;
+  Real step = 0;
+  Vec3 color = Vec3::Constant(-1);
+};
+
+class SpringsEffect final : public Effect {
+ public:
+  SpringsEffect(const SpringsSettings& settings, const World& world, SpringBody body)
+      : settings_(settings), terrain_(world.terrain), body_(std::move(body)), state_(body_.state) {
+    if (world.obstacles && settings.meets)
+      for (const PlacedObstacle& each : *world.obstacles) {
+        obstacles_.add({each.shape, geometry::RigidMotion{each.track.at(0), each.track.at(0), 1}, each.temperature, static_cast<Index>(obstacles_.size() + 1)});
+        tracks_.push_back(each.track);
+      }
+    for (const auto& each : world.obstacles ? *world.obstacles : std::vector<PlacedObstacle>())
+      if (each.name == settings.pinned_to) driver_ = each.track;
+    for (std::size_t i = 0; i < state_.x.size(); ++i)
+      for (const Pin& pin : settings.pins)
+        if ((state_.x[i] - pin.at).norm() <= pin.radius) body_.network.held[i] = 1;
+    start_ = state_.x;
+    make_system();
+  }
+
+  std::string_view name() const override { return settings_.name; }
+  Real time() const override { return time_; }
+
+  void step(Real t_end) override {
+    const Real left = t_end - time_, wanted = settings_.step > 0 ? settings_.step : own_step_;
+    const Real count = std::max(1.0, std::ceil(left / wanted * (1 - 1e-9)));
+    Real dt = left / count;
+    const SpringState before = state_;
+    for (int halving = 0;; ++halving, dt /= 2) {
+      if (advance(dt)) break;
+      state_ = before;
+      if (halving == kHalvings)
+        throw UnstableError(fmt::format("springs '{}' at {:.6g} s: positions or velocities are no numbers any more, even with steps of {:.3g} s; take step below {:.3g} s, or scheme = \"implicit_euler\"",
+                                        settings_.name, time_, dt, limit_));
+      ++retries_;
+    }
+    time_ = count > 1 || dt < left ? time_ + dt : t_end;
+    ++steps_;
+    if (const std::size_t torn = tear_now(); torn > 0) make_system();
+  }
+
+  std::vector<NamedMesh> meshes() const override {
+    geometry::TriMesh mesh = body_.surface;
+    mesh.positions = springs::surface_positions(body_, state_.x);
+    if (!torn_.empty())
+      std::erase_if(mesh.triangles, [&](const geometry::Triangle& t) {
+        for (std::size_t k = 0; k < 3; ++k)
+          if (std::binary_search(torn_.begin(), torn_.end(), pair_of(t[k], t[(k + 1) % 3]))) return true;
+        return false;
+      });
+    geometry::compute_normals(mesh);
+    mesh.attributes.clear();
+    geometry::VertexAttribute& velocity = mesh.attributes["velocity"];
+    velocity.width = 3;
+    for (const Vec3& v : springs::surface_positions(body_, state_.v))
+      for (int c = 0; c < 3; ++c) velocity.values.push_back(static_cast<float>(v[c]));
+    geometry::VertexAttribute& color = mesh.attributes["color"];
+    color.width = 3;
+    const float* usual = settings_.shape == SpringsSettings::Shape::kCloth ? kClothColor : kJellyColor;
+    for (std::size_t k = 0; k < mesh.positions.size(); ++k)
+      for (int c = 0; c < 3; ++c) color.values.push_back(settings_.color[0] < 0 ? usual[c] : static_cast<float>(std::pow(settings_.color[c], 2.2)));
+    std::vector<NamedMesh> all;
+    all.push_back({settings_.name, std::move(mesh)});
+    return all;
+  }
+
+  std::size_t memory() const override {
+    return system_->memory() + state_.x.capacity() * 12 * sizeof(Vec3) + body_.network.springs.capacity() * sizeof(springs::Spring) + body_.weight.capacity() * 64;
+  }
+  void add_to(StateHash& hash) const override {
+    hash.add(time_);
+    hash.add(std::span<const Vec3>(state_.x));
+    hash.add(std::span<const Vec3>(state_.v));
+    hash.add(body_.network.springs.size());
+  }
+  void save(StateWriter& out) const override {
+    out.value("time", time_);
+    out.value("steps", steps_);
+    out.value("retries", retries_);
+    out.array("x", state_.x);
+    out.array("v", state_.v);
+    out.array("torn", torn_);
+  }
+  void load(StateReader& in) override {
+    SpringState state;
+    in.value("time", time_);
+    in.value("steps", steps_);
+    in.value("retries", retries_);
+    in.array("x", state.x);
+    in.array("v", state.v);
+    in.array("torn", torn_);
+    if (state.x.size() != state_.x.size() || state.v.size() != state_.v.size()) throw InputError(Place{"checkpoint"}, fmt::format("springs '{}': holds {} points, the scene's have {}", settings_.name, state.x.size(), state_.x.size()));
+    state_ = std::move(state);
+    std::erase_if(body_.network.springs, [&](const springs::Spring& s) { return std::binary_search(torn_.begin(), torn_.end(), pair_of(s.a, s.b)); });
+    make_system();
+  }
+  std::vector<std::pair<std::string, double>> figures() const override {
+    return {{"points", static_cast<double>(state_.x.size())},
+            {"springs", static_cast<double>(body_.network.springs.size())},
+            {"torn", static_cast<double>(torn_.size())},
+            {"steps", static_cast<double>(steps_)},
+            {"retries", static_cast<double>(retries_)},
+            {"longest_stable_step_s", std::isfinite(limit_) ? limit_ : 0},
+            {"kinetic_energy_j", springs::kinetic_energy(body_.network, state_)},
+            {"spring_energy_j", springs::spring_energy(body_.network, state_)}};
+  }
+  std::string status() const override { return fmt::format("{} points, {} springs, dt {:.3g} s", state_.x.size(), body_.network.springs.size(), settings_.step > 0 ? settings_.step : own_step_); }
+
+ private:
+  /// Two points as one number, the same both ways round.
+  static std::uint64_t pair_of(Index a, Index b) { return static_cast<std::uint64_t>(std::min(a, b)) << 32 | std::max(a, b); }
+
+  void make_system() {
+    system_ = std::make_unique<SpringSystem>(body_.network);
+    system_->surroundings = settings_.around;
+    if (settings_.field.resolution > 0) system_->surroundings.field = &settings_.field;
+    limit_ = springs::longest_stable_step(settings_.scheme, system_->spectrum(state_));
+    own_step_ = settings_.scheme == Scheme::kImplicitEuler ? kImplicitStep : kSafety * limit_;
+  }
+
+  bool advance(Real dt) {
+    if (driver_) {
+      // Held points go where the obstacle carries them, straight within a step.
+      const geometry::RigidPose home = driver_->at(0), to = driver_->at(time_ + dt);
+      for (std::size_t i = 0; i < state_.x.size(); ++i)
+        if (body_.network.held[i]) state_.v[i] = (to.world(home.orientation.conjugate() * (start_[i] - home.position)) - state_.x[i]) / dt;
+    }
+    if (settings_.meets) find_contacts(dt);
+    integrate_step(settings_.scheme, *system_, time_, dt, state_, storage_);
+    return parallel_reduce(
+        state_.x.size(), true, [&](std::size_t i) { return state_.x[i].allFinite() && state_.v[i].allFinite(); }, [](bool a, bool b) { return a && b; });
+  }
+
+  /// Planes of all that a point can reach in the step.
+  void find_contacts(Real dt) {
+    std::vector<PlaneContact>& contacts = system_->surroundings.contacts;
+    contacts.clear();
+    const Real fastest = parallel_max(state_.v.size(), 0.0, [&](std::size_t i) { return state_.v[i].norm(); });
+    const Real reach = settings_.thickness + 2 * fastest * dt + 1e-3;
+    const auto take = [&](std::size_t i, const geometry::Contact& c) {
+      contacts.push_back({static_cast<Index>(i), Vec3(state_.x[i] + (settings_.thickness - c.distance) * c.normal), c.normal, c.surface_velocity});
+    };
+    if (terrain_) {
+      found_.resize(state_.x.size());
+      terrain_->contacts(state_.x, reach, found_);
+      for (std::size_t i = 0; i < found_.size(); ++i)
+        if (found_[i].any()) take(i, found_[i]);
+    }
+    if (tracks_.empty()) return;
+    for (std::size_t k = 0; k < tracks_.size(); ++k) obstacles_.move(k, {tracks_[k].at(time_), tracks_[k].at(time_ + dt), dt});
+    obstacles_.update();
+    constexpr int kPerPoint = 3;
+    found_.resize(kPerPoint * state_.x.size());
+    obstacles_.contacts(state_.x, reach, kPerPoint, found_);
+    for (std::size_t q = 0; q < found_.size(); ++q)
+      if (found_[q].any()) take(q / kPerPoint, found_[q]);
+  }
+
+  std::size_t tear_now() {
+    if (settings_.material.tear_strain <= 0 && settings_.bend.tear_strain <= 0) return 0;
+    const std::vector<springs::Spring> before = body_.network.springs;
+    const std::size_t torn = springs::tear(body_.network, state_.x);
+    if (torn == 0) return 0;
+    std::size_t kept = 0;
+    for (const springs::Spring& s : before) {
+      if (kept < body_.network.springs.size() && s.a == body_.network.springs[kept].a && s.b == body_.network.springs[kept].b) ++kept;
+      else torn_.push_back(pair_of(s.a, s.b));
+    }
+    std::sort(torn_.begin(), torn_.end());
+    return torn;
+  }
+
+  SpringsSettings settings_;
+  const geometry::Terrain* terrain_;
+  SpringBody body_;
+  SpringState state_;
+  std::vector<Vec3> start_;
+  StepStorage<SpringState> storage_;
+  std::unique_ptr<SpringSystem> system_;
+  geometry::Obstacles obstacles_;
+  std::vector<geometry::PoseTrack> tracks_;
+  std::optional<geometry::PoseTrack> driver_;
+  std::vector<geometry::Contact> found_;
+  std::vector<std::uint64_t> torn_;
+  Real time_ = 0, limit_ = 0, own_step_ = 0;
+  std::uint64_t steps_ = 0, retries_ = 0;
+};
+
+Vec3 vector(Parameters& p, const char* key, const char* unit, const Vec3& usual, const char* what) {
+  const std::vector<Real> v = p.numbers(key, unit, 3, false, what);
+  return v.size() == 3 ? Vec3(v[0], v[1], v[2]) : usual;
+}
+
+SpringsSettings read(Parameters& p) {
+  SpringsSettings s;
+  using Shape = SpringsSettings::Shape;
+  s.shape = static_cast<Shape>(p.choice("shape", {"cube", "cloth", "solid"}, 0, "points in a cube; on a mesh's vertices; or in a lattice over a closed mesh's inside"));
+  if (s.shape == Shape::kCube) {
+    s.name = p.text("name", "springs", "for files");
+    s.points = static_cast<int>(p.integer("points", s.points, 2, 60, "a side"));
+    s.size = p.number("size", "m", s.size, Parameters::positive(), "of its sides at rest");
+    s.color = vector(p, "color", "", s.color, "red, green and blue, 0 to 1 (sRGB)");
+  } else {
+    read_form(p, "mesh, relative to the scene file", s.form);
+    s.name = s.form.name;
+    s.color = s.form.color;
+    if (s.shape == Shape::kSolid) s.spacing = p.number("spacing", "m", std::nullopt, Parameters::positive(), "of its points");
+  }
+  if (s.name.empty() || s.name.find_first_of("/\\\n") != std::string::npos) p.fault("name", fmt::format("'{}' cannot be part of a file's name", s.name));
+  s.mass = p.number("mass", "kg", 0, Parameters::not_negative(), "in all; or density");
+  s.density = p.number("density", s.shape == Shape::kCloth ? "kg/m2" : "kg/m3", 0, Parameters::not_negative(), "of the solid, or of a cloth's area; or mass");
+  if ((s.mass > 0) == (s.density > 0)) p.fault(s.mass > 0 ? "mass" : "density", s.mass > 0 ? "found with density, wanted one of the two" : "is missing, wanted density or mass above 0");
+  s.material.stiffness = p.number("stiffness", "N/m", std::nullopt, Parameters::not_negative(), "of its springs");
+  s.material.damping = p.number("damping", "N s/m", 0, Parameters::not_negative(), "along its springs");
+  s.material.tear_strain = p.number("tear_strain", "", 0, Parameters::not_negative(), "torn when longer by this share; 0: never");
+  s.bend = s.material;
+  if (s.shape == Shape::kCloth) {
+    s.bend.stiffness = p.number("bend_stiffness", "N/m", 0.05 * s.material.stiffness, Parameters::not_negative(), "of the springs across its edges");
+    s.bend.tear_strain = 0;
+  }
+  s.pose = read_pose(p, false, {});
+  s.on_ground = p.flag("on_ground", false, "its height counts from the terrain at x, y");
+  s.velocity = vector(p, "velocity", "m/s", s.velocity, "at the start");
+  s.spin = vector(p, "spin", "rad/s", s.spin, "at the start, about its position");
+  for (const std::vector<Real>& pin : p.number_lists("pins", "m", 4, false, "[x, y, z, radius]: points that start this near are held"))
+    s.pins.push_back({Vec3(pin[0], pin[1], pin[2]), pin[3]});
+  s.pinned_to = p.text("pinned_to", "", "obstacle that carries the held points");
+  for (const std::vector<Real>& x : p.number_lists("positions", "m", 3, false, "of every point at the start, instead of rest")) s.positions.push_back(Vec3(x[0], x[1], x[2]));
+  for (const std::vector<Real>& v : p.number_lists("velocities", "m/s", 3, false, "of every point at the start")) s.velocities.push_back(Vec3(v[0], v[1], v[2]));
+  s.around.gravity = vector(p, "gravity", "m/s2", Vec3(0, 0, -kGravity), "");
+  s.around.drag = p.number("drag", "1/s", 0, Parameters::not_negative(), "of the air, per mass");
+  s.around.wind = vector(p, "wind", "m/s", s.around.wind, "");
+  for (const std::vector<Real>& w : p.number_lists("walls", "", 4, false, "[a, b, c, d]: penalty walls that keep a x + b y + c z + d >= 0")) {
+    const Real length = Vec3(w[0], w[1], w[2]).norm();
+    if (!(length > 0)) p.fault("walls", "has one whose a, b and c are all 0, so it has no normal");
+    else s.around.walls.push_back({Vec3(w[0], w[1], w[2]) / length, w[3] / length});
+  }
+  s.meets = p.flag("meets_ground", true, "and obstacles");
+  s.around.response.stiffness = p.number("contact_stiffness", "N/m", 2 * s.material.stiffness, Parameters::not_negative(), "of walls, ground and obstacles");
+  s.around.response.damping = p.number("contact_damping", "N s/m", s.material.damping, Parameters::not_negative(), "of the same");
+  s.around.response.friction = p.number("friction", "", 0.5, Parameters::not_negative(), "Coulomb's number of ground and obstacles; walls have none");
+  s.thickness = p.number("thickness", "m", 0, Parameters::not_negative(), "that it keeps from ground and obstacles");
+  if (p.has("force_field")) {
+    Parameters f = p.table("force_field", "forces on its points, trilinear on a grid, outside as at its border");
+    s.field.low = vector(f, "low", "m", s.field.low, "corner of the grid");
+    s.field.high = vector(f, "high", "m", s.field.high, "opposite corner");
+    s.field.resolution = static_cast<int>(f.integer("resolution", std::nullopt, 2, 512, "corners a side"));
+    for (const std::vector<Real>& v : f.number_lists("values", "N", 3, true, "corner (i, j, k) with k fastest")) s.field.values.push_back(Vec3(v[0], v[1], v[2]));
+    const auto r = static_cast<std::size_t>(s.field.resolution);
+    if (f.has("values") && s.field.values.size() != r * r * r) f.fault("values", fmt::format("holds {} forces, wanted resolution^3 = {}", s.field.values.size(), r * r * r));
+    if (!((s.field.high - s.field.low).minCoeff() > 0)) f.fault("high", "must be above low along x, y and z");
+  }
+  s.scheme = static_cast<Scheme>(p.choice("scheme", std::vector<std::string>(std::begin(kSchemeNames), std::end(kSchemeNames)), 1, "time integration"));
+  s.step = p.number("step", "s", 0, Parameters::not_negative(), "0: half the longest stable one; implicit: 1/240 s");
+  return s;
+}
+
+/// The body of a table, or faults: what does not fit.
+std::optional<SpringBody> make_body(const SpringsSettings& s, const World& world, std::vector<Fault>& faults) {
+  using Shape = SpringsSettings::Shape;
+  const Place place = s.form.place;
+  try {
+    SpringBody body;
+    geometry::RigidPose pose = s.pose;
+    if (s.on_ground && (!world.terrain || !put_on_terrain(pose, true, *world.terrain, "springs '" + s.name + "'", place, faults))) return std::nullopt;
+    if (s.shape == Shape::kCube) {
+      const Real points = static_cast<Real>(s.points) * s.points * s.points;
+      body = springs::jello_cube(s.points, Vec3::Constant(-s.size / 2), s.size, (s.mass > 0 ? s.mass : s.density * s.size * s.size * s.size) / points, s.material);
+    } else {
+      const geometry::TriMesh mesh = s.form.file.empty() ? mesh_of(s.form) : upright(world.mesh(s.form), s.form.scale, s.form.y_up);
+      const Real unit = s.density > 0 ? s.density : 1;
+      body = s.shape == Shape::kCloth ? springs::cloth(mesh, unit, s.material, s.bend) : springs::filled(mesh, s.spacing, unit, s.material);
+      if (s.mass > 0) {
+        Real all = 0;
+        for (const Real m : body.network.mass) all += m;
+        for (Real& m : body.network.mass) m *= s.mass / all;
+      }
+    }
+    for (std::size_t i = 0; i < body.state.x.size(); ++i) {
+      const Vec3 r = pose.orientation * body.state.x[i];
+      body.state.x[i] = pose.position + r;
+      body.state.v[i] = s.velocity + s.spin.cross(r);
+    }
+    for (const auto& [given, what, into] : {std::tuple{&s.positions, "positions", &body.state.x}, std::tuple{&s.velocities, "velocities", &body.state.v}}) {
+      if (given->empty()) continue;
+      if (given->size() != body.state.x.size()) throw InputError(place, fmt::format("springs '{}': {} {}, wanted one for each of its {} points", s.name, given->size(), what, body.state.x.size()));
+      *into = *given;
+    }
+    if (!s.pinned_to.empty()) {
+      std::vector<std::string> names;
+      if (world.obstacles)
+        for (const PlacedObstacle& each : *world.obstacles) names.push_back(each.name);
+      if (std::find(names.begin(), names.end(), s.pinned_to) == names.end()) {
+        const std::string near = nearest_name(s.pinned_to, names);
+        throw InputError(place, fmt::format("springs '{}': pinned_to names '{}', no obstacle of the scene{}", s.name, s.pinned_to, near.empty() ? "" : fmt::format(" (did you mean {}?)", near)));
+      }
+    }
+    return body;
+  } catch (const InputError& error) {
+    for (const Fault& fault : error.faults()) faults.push_back(fault.place.line > 0 ? fault : Fault{place, fault.message});
+    return std::nullopt;
+  }
+}
+
+}  // namespace
+
+EffectPlan read_springs(Parameters& parameters, Real duration) {
+  SpringsSettings settings = read(parameters);
+  settings.form.place = parameters.place("");
+  EffectPlan plan;
+  plan.name = settings.name;
+  const Real n = settings.shape == SpringsSettings::Shape::kCube ? std::pow(settings.points, 3) : 1000;
+  const Real per_point = settings.density > 0 ? settings.density / n : settings.mass / n;
+  // Twenty springs a point, all pulling together: omega^2 about 20 k / m.
+  const Real step = settings.step > 0 ? settings.step : settings.scheme == Scheme::kImplicitEuler ? kImplicitStep : kSafety * 2 / std::sqrt(20 * settings.material.stiffness / std::max(per_point, 1e-12) + 1e-12);
+  plan.estimate.bytes = n * 2000;
+  plan.estimate.steps = std::ceil(duration / step);
+  plan.estimate.seconds = plan.estimate.steps * n * (settings.scheme == Scheme::kImplicitEuler ? 5e-5 : settings.scheme == Scheme::kRk4 ? 6e-7 : 1.5e-7);
+  plan.misfits = [settings](const World& world) {
+    std::vector<Fault> faults;
+    make_body(settings, world, faults);
+    return faults;
+  };
+  plan.build = [settings](const World& world) -> std::unique_ptr<Effect> {
+    std::vector<Fault> faults;
+    std::optional<SpringBody> body = make_body(settings, world, faults);
+    if (!body) throw InputError(faults);
+    return std::make_unique<SpringsEffect>(settings, world, std::move(*body));
+  };
+  return plan;
+}
+
+}  // namespace effuse::flow
