@@ -43,7 +43,7 @@ class BodiesEffect final : public Effect {
   std::vector<std::pair<std::string, double>> figures() const override { return solids_->figures(); }
   std::string status() const override {
     if (!solids_->has_bodies()) return "no bodies";
-    return fmt::format("{} of {} bodies awake, {} contacts", solids_->last().awake, solids_->poses().size(), solids_->last().contacts);
+    return fmt::format("{} of {} bodies awake, {} contacts", solids_->last().awake, solids_->count(), solids_->last().contacts);
   }
 
  private:

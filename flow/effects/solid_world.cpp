@@ -233,7 +233,7 @@ void SolidWorld::step(Real time, Real dt) {
 
 std::vector<std::pair<std::string, double>> SolidWorld::figures() const {
   if (!has_bodies()) return {};
-  std::vector<std::pair<std::string, double>> figures = {{"bodies", static_cast<double>(ids_.size())},
+  std::vector<std::pair<std::string, double>> figures = {{"bodies", static_cast<double>(count())},
           {"bodies_awake", static_cast<double>(last_.awake)},
           {"body_contacts", static_cast<double>(last_.contacts)},
           {"body_steps", totals_.steps},
@@ -294,6 +294,12 @@ std::optional<SolidWorld::Near> SolidWorld::nearest(const Vec3& point, Real reac
   geometry::Contact found;
   if (obstacles_.contacts(point, reach, std::span(&found, 1)) == 0) return std::nullopt;
   return Near{found.surface <= names_.size() ? names_[found.surface - 1] : "a piece that broke off", found.distance, found.surface_velocity.norm()};
+}
+
+std::size_t SolidWorld::count() const {
+  std::size_t n = 0;
+  for (const BodyId id : ids_) n += bodies_->is_gone(id) ? 0 : 1;
+  return n;
 }
 
 Vec3 SolidWorld::velocity(std::size_t body) const { return bodies_->momenta()[ids_[body]] / bodies_->mass(ids_[body]); }

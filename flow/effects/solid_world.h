@@ -65,6 +65,8 @@ class SolidWorld {
   };
   std::optional<Near> nearest(const Vec3& point, Real reach) const;
   bool any() const { return !obstacles_.empty(); }
+  /// Bodies there are now, pieces and blocks among them.
+  std::size_t count() const;
   bool has_bodies() const { return bodies_ != nullptr; }
   const bodies::RigidBodies& bodies() const { return *bodies_; }
   /// Where particles lie on bodies that may break, for the next step. Without such bodies: nothing.

@@ -153,6 +153,10 @@ void FrameWriter::write_manifest(int frames_done, const std::vector<std::pair<st
   m["files"] = files;
   for (const auto& [name, path] : flow) m["flow"][name] = path;
   m["attributes"] = {{"temperature", "K"}, {"velocity", "m/s"}, {"crust", "0 molten .. 1 solid"}, {"region", "id of the particle whose Voronoi region it is, PLY only"}};
+  if (solids_.any_breaks()) {
+    m["attributes"]["piece"] = "number of a piece for life, from 1; 0: of what cannot break; obstacles only";
+    m["attributes"]["inner"] = "1 on faces that breaking has made; obstacles only";
+  }
   ordered_json times = ordered_json::array();
   for (int frame = 1; frame <= frames_done; ++frame) times.push_back(scene_.frame_time(frame));
   m["frame_times"] = times;
