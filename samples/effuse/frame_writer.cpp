@@ -92,7 +92,7 @@ FrameWriter::Result FrameWriter::write_frame(const flow::Simulation& simulation)
   for (const auto& effect : simulation.effects())
     for (flow::NamedMesh& own : effect->meshes()) {
       if (std::find(meshes_.begin(), meshes_.end(), own.name) == meshes_.end()) meshes_.push_back(own.name);
-      if (settings_.ply) skin::write_ply(frames / numbered(own.name.c_str(), frame, "ply"), own.mesh, about, skin::PlyPositions::kDouble);
+      if (settings_.ply) skin::write_exact_ply(frames / numbered(own.name.c_str(), frame, "ply"), own.mesh, about);
       if (!preview_) continue;
       if (others.positions.empty()) others = std::move(own.mesh);
       else geometry::append(others, own.mesh);
