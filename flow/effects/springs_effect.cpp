@@ -169,6 +169,8 @@ class SpringsEffect final : public Effect {
     system_ = std::make_unique<SpringSystem>(body_.network);
     system_->surroundings = settings_.around;
     if (settings_.field.resolution > 0) system_->surroundings.field = &settings_.field;
+    mean_rest_ = 0;
+    for (const springs::Spring& each : body_.network.springs) mean_rest_ += each.rest / static_cast<Real>(body_.network.springs.size());
     limit_ = springs::longest_stable_step(settings_.scheme, system_->spectrum(state_));
     own_step_ = settings_.scheme == Scheme::kImplicitEuler ? kImplicitStep : kSafety * limit_;
   }
@@ -191,7 +193,8 @@ class SpringsEffect final : public Effect {
     std::vector<PlaneContact>& contacts = system_->surroundings.contacts;
     contacts.clear();
     const Real fastest = parallel_max(state_.v.size(), 0.0, [&](std::size_t i) { return state_.v[i].norm(); });
-    const Real reach = settings_.thickness + 2 * fastest * dt + 1e-3;
+    // As far as a point may move, and as deep as it may have sunk: solids of meshes are felt within reach only.
+    const Real reach = settings_.thickness + 2 * fastest * dt + mean_rest_ / 2;
     const auto take = [&](std::size_t i, const geometry::Contact& c) {
       contacts.push_back({static_cast<Index>(i), Vec3(state_.x[i] + (settings_.thickness - c.distance) * c.normal), c.normal, c.surface_velocity});
     };
@@ -237,7 +240,7 @@ class SpringsEffect final : public Effect {
   std::optional<geometry::PoseTrack> driver_;
   std::vector<geometry::Contact> found_;
   std::vector<std::uint64_t> torn_;
-  Real time_ = 0, limit_ = 0, own_step_ = 0;
+  Real time_ = 0, limit_ = 0, own_step_ = 0, mean_rest_ = 0;
   std::uint64_t steps_ = 0, retries_ = 0;
 };
 

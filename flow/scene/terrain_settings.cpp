@@ -7,8 +7,8 @@ namespace effuse::flow {
 TerrainSettings read_terrain_settings(Parameters& root) {
   TerrainSettings s;
   Parameters terrain = root.table("terrain", "the ground");
+  Parameters plane = terrain.table("plane", "flat ground about the origin, instead of a file");
   if (terrain.has("plane")) {
-    Parameters plane = terrain.table("plane", "flat ground about the origin, instead of a file");
     const std::vector<Real> size = plane.numbers("size", "m", 2, true, "along x and y");
     s.plane.emplace();
     if (size.size() == 2) s.plane->size = Vec2(size[0], size[1]);

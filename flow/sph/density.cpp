@@ -45,7 +45,8 @@ namespace {
 ///   up     to the free surface, unit, of particles that are sure of it; 0 of others
 ///   off    how far that is [m]
 void resist_thin_lava(const ParticleSystem& s, const FilmFriction& film, std::vector<Real>& depth, std::span<const Vec3> up, std::span<const Real> off, Walls& walls) {
-  // Those near a wall that do not see the surface hear of it from neighbours that do, and from those on the same wall that have heard.
+  // Those near a wall that do not see the surface hear of it from neighbours that do, and from those on the same wall that have heard; by an
+  // obstacle's also from those beyond the wall's reach (on the ground that would make films of six layers, with strength, too slow).
   std::vector<Real> told = depth;
   for (int round = 0; round < 2; ++round) {
     parallel_for(s.size(), [&](std::size_t i) {
@@ -60,7 +61,7 @@ void resist_thin_lava(const ParticleSystem& s, const FilmFriction& film, std::ve
             if ((several || walls[j].size() > 1) && walls.walls[k].normal.dot(wall.normal) < kSameFace) continue;
             least = std::min(least, depth[k]);
           }
-          if (least == kUnseen && walls[j].empty() && up[j].dot(wall.normal) > kAcross) least = wall.distance + s.separation<true>(j, static_cast<Index>(i)).dot(wall.normal) + off[j];
+          if (least == kUnseen && wall.mirrors && walls[j].empty() && up[j].dot(wall.normal) > kAcross) least = wall.distance + s.separation<true>(j, static_cast<Index>(i)).dot(wall.normal) + off[j];
           if (least == kUnseen) continue;
           sum += least;
           seen += 1;

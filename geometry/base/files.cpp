@@ -17,6 +17,9 @@ namespace {
 [[noreturn]] void fail(const fs::path& path, const char* what, int error) {
   const std::string message = fmt::format("{}: cannot {}: {}", path.string(), what, std::strerror(error));
   if (error == ENOSPC || error == EDQUOT || error == EFBIG || error == ENOMEM) throw ResourceError(message);
+  // A place that was asked for and cannot be written to.
+  if (error == EACCES || error == EPERM || error == EROFS || error == ENOTDIR || error == ENOENT || error == EISDIR || error == ENAMETOOLONG || error == ELOOP || error == EEXIST)
+    throw InputError(Place{path.string()}, fmt::format("cannot {}: {}", what, std::strerror(error)));
   throw std::runtime_error(message);
 }
 
@@ -33,6 +36,7 @@ AtomicFile::AtomicFile(fs::path path) : path_(std::move(path)) {
   std::error_code error;
   if (path_.has_parent_path()) fs::create_directories(path_.parent_path(), error);
   if (error) fail(path_, "create the folder of", error.value());
+  if (::access(path_.has_parent_path() ? path_.parent_path().c_str() : ".", W_OK) != 0) fail(path_, "write", errno);
   temporary_ = path_.parent_path() / (path_.stem().string() + ".part" + path_.extension().string());
 }
 

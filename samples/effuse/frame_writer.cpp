@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "geometry/base/files.h"
+#include "geometry/base/log.h"
 #include "geometry/base/zones.h"
 #include "geometry/procedural/primitives.h"
 #include "skin/color/lava_color.h"
@@ -65,7 +66,8 @@ FrameWriter::Result FrameWriter::write_frame(const flow::Simulation& simulation)
     options.detail->rest_ratio = points.rest_ratio;
     skin = skin::make_skin(points, effect->volume(), &terrain_, options, &last_);
     skin::color_lava(skin.mesh, settings_.color);
-    result.volume = skin.report.level_set.volume;
+    result.volume = skin.report.volume.after > 0 ? skin.report.volume.after : skin.report.level_set.volume;
+    if (preview_) warn_of_lava_on(skin::picture_at(settings_, terrain_, frame / scene_.fps).camera.eye, points, effect->spacing(), frame);
     result.particle_volume = effect->volume();
   }
   const geometry::TriMesh& mesh = skin.mesh;
@@ -95,7 +97,7 @@ FrameWriter::Result FrameWriter::write_frame(const flow::Simulation& simulation)
   for (const auto& effect : simulation.effects())
     for (flow::NamedMesh& own : effect->meshes()) {
       if (std::find(meshes_.begin(), meshes_.end(), own.name) == meshes_.end()) meshes_.push_back(own.name);
-      if (settings_.ply) skin::write_ply(frames / numbered(own.name.c_str(), frame, "ply"), own.mesh, about, skin::PlyPositions::kDouble);
+      if (settings_.ply) skin::write_exact_ply(frames / numbered(own.name.c_str(), frame, "ply"), own.mesh, about);
       if (!preview_) continue;
       if (others.positions.empty()) others = std::move(own.mesh);
       else geometry::append(others, own.mesh);
@@ -105,6 +107,12 @@ FrameWriter::Result FrameWriter::write_frame(const flow::Simulation& simulation)
     skin::write_png(folder_ / "preview" / numbered("preview", frame, "png"), image);
   }
   return result;
+}
+
+void FrameWriter::warn_of_lava_on(const Vec3& eye, const geometry::Points& points, Real spacing, int frame) {
+  if (told_of_camera_ || std::none_of(points.position.begin(), points.position.end(), [&](const Vec3& x) { return (x - eye).squaredNorm() < spacing * spacing; })) return;
+  told_of_camera_ = true;
+  log_warning(fmt::format("preview: in frame {} the camera stands in the lava; more elevation or distance, or another azimuth would do", frame));
 }
 
 void FrameWriter::write_contact_sheet(int frames) {

@@ -98,6 +98,7 @@ std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const
     loaded->solids.make_looks();
     check_map(loaded->skin, *loaded->terrain, *loaded->simulation);
     skin::check_camera(loaded->skin, *loaded->terrain, scene.frames, scene.fps);
+    check_camera_among(loaded->solids, loaded->skin, *loaded->terrain, scene);
     flow::Node resolved = root.resolved();
     // The resolved scene is written elsewhere: there, too, it must find its files.
     const auto whole = [](const std::filesystem::path& path) {

@@ -83,7 +83,7 @@ void add_skin_options(CLI::App* verb, effuse::SkinCommand& skin) {
                    "passes of mean-curvature flow on the level set before it is meshed, each of radius^2 / 6 (about three of splashsurf's on its mesh at cube size 0.5); drops keep their size [2; 0 with --kernel anisotropic]")
       ->check(CLI::Range(0, 100));
   verb->add_option("--drop-volume", skin.drop_volume, "leave out closed pieces, and fill bubbles, of less than this many particles' volume [0]")->check(CLI::Range(0.0, 1e9));
-  verb->add_option("--tessellation", skin.tessellation, "levelset: triangles of one size; voronoi: fans of triangles, a spacing wide, on each particle's part of the surface. PLY carries the particle's id as region: of vertices, and with voronoi of faces [levelset]")
+  verb->add_option("--tessellation", skin.tessellation, "levelset: triangles of one size; voronoi: fans of triangles, a spacing wide, on each particle's part of the surface. PLY carries the particle's id as region: of vertices, and with voronoi of faces. Fans cut through one another in gaps and necks narrower than they are, loose spray above all: --check tells [levelset]")
       ->check(CLI::IsMember({"levelset", "voronoi"}));
   verb->add_option("--coarsen", skin.coarsen, "fewer triangles where the surface is flat to so many particle spacings (2 radii), 0.1 say; 0: none; goes with levelset [0]")->check(CLI::Range(0.0, 1.0));
   verb->add_option("--kind", skin.kind,
@@ -92,7 +92,9 @@ void add_skin_options(CLI::App* verb, effuse::SkinCommand& skin) {
       ->check(CLI::IsMember({"none", "aa", "pahoehoe", "block", "obsidian", "noise"}));
   verb->add_option("--amplitude", skin.amplitude, "with --kind: half the height of its bumps where cold, in particle spacings (2 radii); 0: colours alone [0.25]")->check(CLI::Range(0.0, 10.0));
   verb->add_option("--edge", skin.edge, "with --kind: the mesh is refined to edges of so many particle spacings, 0.1 say for close-ups [the cube size]")->check(CLI::Range(0.05, 10.0));
-  verb->add_option("--seed", skin.seed, "with --kind: another one, other bumps [1]");
+  // Beyond what 64 bits hold it would be cut to that in silence.
+  const CLI::Validator whole([](std::string& text) { return !text.empty() && text.size() <= 19 && text.find_first_not_of("0123456789") == std::string::npos ? "" : "must be a whole number of up to 19 digits"; }, "");
+  verb->add_option("--seed", skin.seed, "with --kind: another one, other bumps [1]")->check(whole);
   verb->add_option("--temperature", skin.temperature, "with --kind: of particles whose file has none, 1100 (kelvin) or '950 degC'; absent: cold rock that does not glow");
   verb->add_option("--terrain", skin.terrain, "ground to end the skin at: a DEM grid (ESRI ASCII) or a mesh, z up, in the coordinates of the particles; what they enclose is counted above it");
   verb->add_option("--origin", skin.origin, "x y z that the outputs count from: subtracted from all positions, for map coordinates and others that floats are too coarse for; --terrain and --particle-aabb stay in the particles' own")->expected(3);

@@ -256,6 +256,7 @@ skin::LevelSetOptions level_set_options(const SkinCommand& command, Real radius,
   options.match_volume = match_volume;
   if (match_volume) {
     options.radius = std::min(options.radius, options.influence - 1.05);
+    options.cover = std::min(options.cover, options.radius);
     return options;
   }
   if (options.kernel == skin::SurfaceKernel::kAnisotropic) {
@@ -264,6 +265,7 @@ skin::LevelSetOptions level_set_options(const SkinCommand& command, Real radius,
   }
   const Real threshold = command.surface_threshold.value_or(0.5);
   options.radius = flat_radius(options.influence, threshold_distance(threshold) * options.influence);
+  options.cover = command.surface_threshold ? 0 : std::min(options.cover, options.radius);  // a threshold says where the surface is
   const Real most = std::min(1.0, options.influence - 1.05);
   if (options.radius < 0.2 || options.radius > most)
     throw InputError(Place{}, fmt::format("--surface-threshold {} with --smoothing-length {} would round a lone particle with {:.2f} of its spacing, wanted 0.2 to {:.2f}", threshold,
@@ -302,6 +304,16 @@ std::optional<Real> told_temperature(const SkinCommand& command) {
   }
   if (!(kelvin > 0 && kelvin <= 5000)) throw InputError(Place{}, fmt::format("--temperature {} is {:.6g} K, wanted more than 0 and at most 5000 K", command.temperature, kelvin));
   return kelvin;
+}
+
+/// Temperatures as no file should have them; with --kind, which makes colour and glow of them, also those that no lava has.
+void refuse_temperatures(const fs::path& file, const PointCloud& cloud, bool used) {
+  constexpr Real kHottest = 5000;  // [K] as --temperature has it
+  for (std::size_t i = 0; i < cloud.temperature.size(); ++i) {
+    const Real T = cloud.temperature[i];
+    if (std::isfinite(T) && (!used || (T >= 0 && T <= kHottest))) continue;
+    throw InputError(Place{file.string()}, fmt::format("particle {} has a temperature of {:.6g}, wanted {}{}", i, T, used ? "kelvin from 0 to 5000" : "a finite number", used && T < 0 && T > -274 ? ": is it in degrees Celsius?" : ""));
+  }
 }
 
 // The ground.
@@ -436,9 +448,12 @@ class Skinner {
     const std::vector<fs::path> outputs = outputs_of(command_, number, file);
     PointCloud cloud = importers::import_points(file, {.radius = command_.particle_radius == 0});
     for (const std::string& note : cloud.notes) tell_once(file, note);
+    refuse_temperatures(file, cloud, detail_.has_value());
     const std::size_t read = cloud.size();
     const std::string anchor = detail_ ? anchor_detail(file, number.has_value(), cloud) : "";
     if (box_) crop(cloud, *box_);
+    if (read == 0) warn_once(file, "holds no particle: its mesh is empty");
+    else if (cloud.size() == 0) warn_once(file, "has no particle in the box of --particle-aabb-min and -max: its mesh is empty");
     for (auto* at : {&cloud.position, &cloud.rest, &cloud.rest2})
       for (Vec3& x : *at) x -= origin_;
     if (detail_) choose_temperature(file, cloud);
@@ -480,7 +495,7 @@ class Skinner {
     if (cloud.size() > 0) {
       j["radius"] = radius;
       j["radius_from"] = radius_->source;
-      j["volume"] = surface.report().volume;
+      j["volume"] = skin.report.volume.after > 0 ? skin.report.volume.after : surface.report().volume;
       j["particle_volume"] = volume;
       if (match && std::abs(surface.report().residual) > 0.01)
         tell_once(file, fmt::format("the skin encloses {:.3g} times the particles' volume: they overlap, or the radius is not half their spacing", 1 + surface.report().residual));
@@ -501,6 +516,7 @@ class Skinner {
       if (!skin.report.refined_enough) tell_once(file, "edges stay longer than --edge asks for: the mesh would have more than 20 million triangles");
     }
     const skin::LevelSetReport& report = surface.report();
+    if (cloud.size() > 0 && meshed && mesh.triangles.empty()) warn_once(file, report.dropped_pieces > 0 ? "every piece is smaller than --drop-volume: its mesh is empty" : "its mesh is empty: the ground covers all particles, or voxels are too coarse for them");
     if (report.dropped_pieces + report.filled_bubbles > 0) {
       j["dropped_pieces"] = report.dropped_pieces;
       j["filled_bubbles"] = report.filled_bubbles;
@@ -590,10 +606,12 @@ class Skinner {
       radius_ = Radius{spacing / 2, "estimated"};
       log_info(fmt::format("{}: no radii; estimated as half the distance of neighbours: --particle-radius {:.6g}", file.string(), radius_->value));
     }
+    if (!(radius_->value >= kLeastRadius && radius_->value <= kLargestRadius))
+      throw InputError(Place{file.string()}, fmt::format("a particle radius of {:.6g} ({}): wanted {:g} to {:g}, in the unit of the positions", radius_->value, radius_->source, kLeastRadius, kLargestRadius));
     if (!own) cloud.radius.assign(cloud.size(), radius_->value);
   }
+  static constexpr Real kLeastRadius = 1e-6, kLargestRadius = 1e6;  // volumes and voxels stay numbers that floats hold
 
-  /// The level set ends at the ground, which has to be where the particles are.
   /// Far from the origin floats are so coarse that a mesh tears.
   void refuse_coarse_floats(const fs::path& file, const PointCloud& cloud, const std::vector<fs::path>& outputs) const {
     if (cloud.size() == 0 || std::all_of(outputs.begin(), outputs.end(), [](const fs::path& f) { return format_of(f) == Format::kObj; })) return;
@@ -602,12 +620,15 @@ class Skinner {
     const Real farthest = std::max(box.min().cwiseAbs().maxCoeff(), box.max().cwiseAbs().maxCoeff()), step = farthest * 0x1p-23;
     constexpr Real kFinest = 64;  // parts of a radius
     if (step * kFinest <= radius_->value) return;
+    const Real across = box.sizes().maxCoeff();
+    const std::string found = fmt::format("positions up to {:.4g}: the floats of PLY, GLB and VDB count in steps of {:.2g} there, wanted {:.2g}, a sixty-fourth of a particle's radius. ", farthest, step, radius_->value / kFinest);
+    if (across / 2 * 0x1p-23 * kFinest > radius_->value)
+      throw InputError(Place{file.string()}, found + fmt::format("They lie {:.4g} apart, so that no --origin helps: .obj holds more digits, --particle-aabb-min and -max cut strays away, or is the radius, {:.4g}, too small?", across, radius_->value));
     const Vec3 middle = (origin_ + box.center()).array().round();
-    throw InputError(Place{file.string()}, fmt::format("positions up to {:.4g}: the floats of PLY, GLB and VDB count in steps of {:.2g} there, wanted {:.2g}, a sixty-fourth of a particle's radius. "
-                                                       "--origin {:.12g} {:.12g} {:.12g} has the outputs count from there",
-                                                       farthest, step, radius_->value / kFinest, middle.x(), middle.y(), middle.z()));
+    throw InputError(Place{file.string()}, found + fmt::format("--origin {:.12g} {:.12g} {:.12g} has the outputs count from there", middle.x(), middle.y(), middle.z()));
   }
 
+  /// The level set ends at the ground, which has to be where the particles are.
   void look_for_ground(const fs::path& file, const PointCloud& cloud) {
     for (const Vec3& x : cloud.position)
       if (terrain_->height(x.x(), x.y())) return;
@@ -652,7 +673,14 @@ ExitCode skin_particles(const SkinCommand& command, const CommonOptions& common)
   if (!command.match_volume.value_or(true) || command.surface_threshold) level_set_options(command, 1, false);  // refused now, if at all
   if (command.coarsen > 0 && command.tessellation == "voronoi") throw InputError(Place{}, "--coarsen goes with --tessellation levelset: voronoi's triangles belong to their particles");
   if (!command.terrain.empty() && command.up == "y") throw InputError(Place{}, "--terrain is z up, and so must the particles be: not --up y");
+  const bool volumes_only = std::all_of(command.meshes.begin(), command.meshes.end(), [](const fs::path& file) { return format_of(file) == Format::kVdb; });
+  if (volumes_only && !command.check && (command.tessellation == "voronoi" || command.coarsen > 0))
+    throw InputError(Place{}, fmt::format("{} goes with a mesh: .vdb holds the surface itself", command.coarsen > 0 ? "--coarsen" : "--tessellation voronoi"));
+  if (command.start_index && command.end_index && *command.start_index > *command.end_index)
+    throw InputError(Place{}, fmt::format("--start-index {} is beyond --end-index {}", *command.start_index, *command.end_index));
   const Inputs inputs = find_inputs(command);
+  if (inputs.single && (command.start_index || command.end_index))
+    throw InputError(Place{inputs.single->string()}, "is one file: --start-index and --end-index go with a sequence, particles.####.ply");
   // Names are refused before the first frame is made.
   if (inputs.single) outputs_of(command, std::nullopt, *inputs.single);
   for (const auto& [number, file] : inputs.frames) outputs_of(command, number, file);

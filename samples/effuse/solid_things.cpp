@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "geometry/base/check.h"
+#include "geometry/base/error.h"
 #include "geometry/procedural/primitives.h"
 #include "importers/mesh/import_mesh.h"
 #include "samples/effuse/solid_look.h"
@@ -160,6 +161,18 @@ geometry::TriMesh in_one_picture(geometry::TriMesh lava, const geometry::TriMesh
   if (!lava.attributes.contains("color")) cold.attributes.erase("color");
   geometry::append(lava, cold);
   return lava;
+}
+
+void check_camera_among(const SolidThings& things, const skin::SkinSettings& settings, const geometry::Terrain& terrain, const flow::Scene& scene) {
+  if (!settings.preview || things.obstacles.empty()) return;
+  for (int frame = 1; frame <= scene.frames; ++frame) {
+    const Vec3 eye = skin::picture_at(settings, terrain, frame / scene.fps).camera.eye;
+    for (const flow::PlacedObstacle& each : things.obstacles) {
+      const geometry::RigidPose pose = each.track.at(scene.frame_time(frame));
+      if (!each.shape.inside(pose.body(eye))) continue;
+      throw InputError(settings.camera_place, fmt::format("preview: in frame {} the camera stands in obstacle '{}'; more elevation, another azimuth or distance would do", frame, each.name));
+    }
+  }
 }
 
 }  // namespace effuse

@@ -9,6 +9,7 @@
 #include "flow/scene/rigid_bodies.h"
 #include "flow/scene/scene.h"
 #include "geometry/mesh/tri_mesh.h"
+#include "skin/scene/skin_settings.h"
 
 namespace effuse {
 
@@ -49,6 +50,9 @@ struct SolidThings {
   /// the bodies that can break. Where there are such: "piece", 0 for the others, and "inner", 1 on faces that breaking has made.
   geometry::TriMesh at(Real time, const std::vector<geometry::RigidPose>& poses = {}, const std::vector<flow::SolidPiece>& pieces = {}) const;
 };
+
+/// Throws InputError where the picture's camera stands in an obstacle at a frame of the film. Bodies, which move as they will, are not asked.
+void check_camera_among(const SolidThings& things, const skin::SkinSettings& settings, const geometry::Terrain& terrain, const flow::Scene& scene);
 
 /// Lava and obstacles for one picture: these cold and dull.
 geometry::TriMesh in_one_picture(geometry::TriMesh lava, const geometry::TriMesh& obstacles);

@@ -85,12 +85,14 @@ SkinSettings read_skin_settings(flow::Parameters& root) {
   LevelSetOptions& level_set = s.level_set;
   level_set.influence = skin.number("influence", "", level_set.influence, {1, 4}, "a particle is felt within this many spacings");
   level_set.radius = skin.number("radius", "", level_set.radius, {0.3, 1}, "of the sphere round a lone particle, in spacings");
+  level_set.cover = skin.number("cover", "", level_set.cover, {0, 1}, "of the ball round each particle that is lava whatever its neighbours say, in spacings: keeps corners, edges and thin fronts; 0: none");
   level_set.kernel = static_cast<SurfaceKernel>(skin.choice("kernel", {kSurfaceKernelNames.begin(), kSurfaceKernelNames.end()}, static_cast<std::size_t>(level_set.kernel),
                                                             "particles are averaged with spheres, or with ellipsoids that follow the surface: flatter, sharper fronts, slower"));
   if (level_set.kernel == SurfaceKernel::kAnisotropic) level_set.smoothing = 0;
   level_set.smoothing = static_cast<int>(skin.integer("smoothing", level_set.smoothing, 0, 20, "passes of mean-curvature flow"));
   if (!(level_set.influence > level_set.radius + 1))
     skin.fault(skin.has("influence") ? "influence" : "radius", fmt::format("influence {:g} with radius {:g}: wanted an influence of more than the radius and one spacing", level_set.influence, level_set.radius));
+  if (level_set.cover > level_set.radius) skin.fault(skin.has("cover") ? "cover" : "radius", fmt::format("cover {:g} with radius {:g}: wanted a cover of no more than the radius", level_set.cover, level_set.radius));
   level_set.drop_volume = skin.number("drop_volume", "", level_set.drop_volume, Parameters::not_negative(), "pieces of fewer particles are left out");
   level_set.match_volume = skin.flag("match_volume", level_set.match_volume, "enclose the particles' volume");
   s.tessellation = static_cast<TessellationKind>(skin.choice("tessellation", {kTessellationNames.begin(), kTessellationNames.end()}, static_cast<std::size_t>(s.tessellation),

@@ -18,6 +18,9 @@ namespace {
 /// all the cells around it into triangles of no area.
 constexpr float kLeast = 1.0f / 64;
 
+/// Least cosine between the field's slope and the crossings where the slope is believed; how far along it a vertex may go [voxels].
+constexpr float kAgree = 0.3f, kFarthest = 0.2f;
+
 float off_zero(float v) { return std::abs(v) >= kLeast ? v : v < 0 ? -kLeast : kLeast; }
 
 /// Values from voxel -1 to 9 of a block, z fastest.
@@ -73,16 +76,25 @@ unsigned joined_faces(const Padded& p, int i, int j, int k, unsigned configurati
   return joined;
 }
 
-/// Central differences at the voxels of a cell, trilinear between, at x within it.
-Eigen::Vector3f smooth_gradient(const Padded& p, int i, int j, int k, const Eigen::Vector3f& x) {
-  Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+/// The field near a point of a cell: central differences at the cell's voxels, trilinear between.
+struct Local {
+  Eigen::Vector3f gradient;
+  float value;  ///< trilinear, less what that is too large by where the field is curved: sum t (1 - t) / 2 times the second differences
+};
+Local local_field(const Padded& p, int i, int j, int k, const Eigen::Vector3f& x) {
+  Eigen::Vector3f slope = Eigen::Vector3f::Zero(), bend = Eigen::Vector3f::Zero();
+  float value = 0;
   for (int corner = 0; corner < 8; ++corner) {
     const int di = corner >> 2, dj = (corner >> 1) & 1, dk = corner & 1;
     const float weight = (di ? x[0] : 1 - x[0]) * (dj ? x[1] : 1 - x[1]) * (dk ? x[2] : 1 - x[2]);
     const float* c = &p.value[Padded::at(i + di, j + dj, k + dk)];
-    sum += weight * Eigen::Vector3f(c[Padded::kX] - c[-Padded::kX], c[Padded::kY] - c[-Padded::kY], c[1] - c[-1]);
+    const Eigen::Vector3f after(c[Padded::kX], c[Padded::kY], c[1]), before(c[-Padded::kX], c[-Padded::kY], c[-1]);
+    slope += weight * (after - before);
+    bend += weight * (after + before);
+    value += weight * c[0];
   }
-  return sum / 2;
+  const Eigen::Vector3f curved = bend.array() - 2 * value;
+  return {slope / 2, value - (x.array() * (1 - x.array()) * curved.array()).sum() / 2};
 }
 
 /// Vertices of a block's cells, quads left out.
@@ -122,9 +134,14 @@ void mesh_cells(const Padded& p, MeshedBlock& out) {
           ++crossings[patch];
         }
         for (unsigned patch = 0; patch < dual.patches; ++patch) {
-          const Eigen::Vector3f x = middle[patch] / static_cast<float>(crossings[patch]), &way = outward[patch];
-          Eigen::Vector3f normal = smooth_gradient(p, i, j, k, x);
-          constexpr float kAgree = 0.3f;
+          Eigen::Vector3f x = middle[patch] / static_cast<float>(crossings[patch]);
+          const Eigen::Vector3f& way = outward[patch];
+          const Local local = local_field(p, i, j, k, x);
+          Eigen::Vector3f normal = local.gradient;
+          if (normal.dot(way) > kAgree * normal.norm() * way.norm()) {
+            const float length = normal.norm();
+            x -= std::clamp(local.value / length, -kFarthest, kFarthest) / length * normal;
+          }
           if (!(normal.dot(way) > kAgree * normal.norm() * way.norm())) normal = way;
           out.position.push_back(Eigen::Vector3f(static_cast<float>(i), static_cast<float>(j), static_cast<float>(k)) + x);
           out.normal.push_back(normal.normalized().cast<Real>().normalized());

@@ -36,7 +36,8 @@ struct MeshCache {
 };
 
 /// The zero level of phi as triangles with normals: dual, with one vertex for each patch of the surface in each cell that it crosses,
-/// in the middle of the patch's crossings, and two triangles for each crossed edge, split along the shorter diagonal. Counter-
+/// in the middle of the patch's crossings and from there along the field's slope onto the surface (one step of Newton's, a fifth of a
+/// voxel at most, the field's second differences taken into account: without it coarse voxels cut corners off), and two triangles for each crossed edge, split along the shorter diagonal. Counter-
 /// clockwise from outside. Closed, oriented and manifold for every phi: patches that share a cell have vertices of their own,
 /// and faces on which two sheets would share an edge are turned to part them.
 ///

@@ -1,9 +1,15 @@
 #include "skin/surface/level_set.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
 
 #include "geometry/base/check.h"
+#include "geometry/base/error.h"
+#include "geometry/base/memory.h"
 #include "geometry/base/parallel.h"
 #include "geometry/base/zones.h"
 #include "skin/surface/anisotropy.h"
@@ -31,12 +37,17 @@ std::size_t LevelSet::active_voxels() const {
 
 namespace {
 
+constexpr float kCoverBlend = 0.3f;  // [spacings]: round enough for fans and relief to follow
+// W at a particle over that of a full neighbourhood: in a box's corners 0.5 to 0.62, on its edges 0.55 to 0.7, on faces 0.74 and more.
+constexpr float kStandsOut = 0.62f, kLiesFlat = 0.72f;
+
 /// What the field is made with; lengths in voxels.
 struct Making {
   SurfaceKernel kernel = SurfaceKernel::kRound;
   RasterOptions raster;
   float smoothing = 0;       // time of the flow
   float lone = 0, sheet = 0;  // W at the surface of a lone particle, of a plane sheet
+  Cover cover;
   float sink = 0;
   const geometry::Terrain* terrain = nullptr;
   Real volume = 0;      // to be enclosed; 0: as it comes
@@ -53,6 +64,7 @@ Field make_field(const LevelSet::Impl& s, const Blocks& blocks, const Making& ma
   else
     rasterize(s.particles, blocks, making.raster, phi, weight);
   smooth(blocks, s.outside, making.smoothing, weight, making.lone, making.sheet, phi);
+  cover_particles(s.particles, blocks, s.outside, making.cover, phi);
   if (!making.terrain) return phi;
   ground = sample_ground(blocks, s.particles.origin(), s.voxel, *making.terrain, std::max(2 * s.lift, making.depth()) + 1);
   Field lifted;
@@ -77,7 +89,9 @@ Renewal renew_field(const LevelSet::Impl& s, const Making& making, SurfaceCache:
   const bool round = making.kernel == SurfaceKernel::kRound, blocks_beside = !round || making.raster.reach >= kFineReach;
   const Real felt = round ? static_cast<Real>(s.reach) + (blocks_beside ? 4 : 0)
                           : std::max<Real>(kernel_influence(making.raster.spacing, s.reach), kSide + static_cast<Real>(making.raster.spacing));
-  Renewal renewal = find_stale(last, s.particles, hash, hashes, s.blocks, felt + static_cast<Real>(beyond));
+  const Real largest = parallel_max(s.particles.size(), 0, [&](std::size_t i) { return static_cast<Real>(s.particles.radius()[i]); });
+  const Real covered = static_cast<Real>(making.cover.factor) * largest + static_cast<Real>(kCoverBand + lift + s.reach);
+  Renewal renewal = find_stale(last, s.particles, hash, hashes, s.blocks, std::max(felt + static_cast<Real>(beyond), making.cover.factor > 0 ? covered : 0));
   const std::vector<std::uint8_t> needed = widened(s.blocks, renewal.stale, static_cast<int>(std::ceil(beyond / kSide)) + (blocks_beside ? 1 : 0));
   std::vector<BlockCoord> coords;
   for (std::size_t b = 0; b < s.blocks.size(); ++b)
@@ -111,7 +125,7 @@ Renewal renew_field(const LevelSet::Impl& s, const Making& making, SurfaceCache:
 bool fits(const SurfaceCache::Impl& last, const LevelSetOptions& o, const geometry::Terrain* terrain, const Vec3& origin) {
   const LevelSetOptions& p = last.options;
   return last.filled && last.terrain == terrain && last.origin == origin && p.spacing == o.spacing && p.voxel == o.voxel && p.influence == o.influence && p.kernel == o.kernel &&
-         p.radius == o.radius && p.smoothing == o.smoothing && p.sink == o.sink;
+         p.radius == o.radius && p.cover == o.cover && p.smoothing == o.smoothing && p.sink == o.sink;
 }
 
 /// The shift at which the volume asked for is enclosed; it is not made yet, but `outside` has moved. phi, above: of all blocks.
@@ -242,6 +256,7 @@ LevelSet build_level_set(const geometry::Points& points, Real volume, const geom
   CHECK_GT(options.radius, 0.0);
   CHECK_GT(options.influence, options.radius + 1);  // else a shift could push the surface out of the field
   CHECK_GE(options.sink, 0.0);
+  CHECK(options.cover >= 0 && options.cover <= options.radius);
   LevelSet surface;
   LevelSet::Impl& s = surface.impl();
   s.spacing = options.spacing;
@@ -261,13 +276,23 @@ LevelSet build_level_set(const geometry::Points& points, Real volume, const geom
   // The dual mesh rounds the edge where side and bottom meet: a voxel and a half keeps that under the ground. Blocks must
   // reach beyond the particles' own reach to hold the bottom.
   const float sink = options.sink > 0 ? static_cast<float>(options.sink / s.voxel) : 1.5f;
-  s.blocks = blocks_around(s.particles, s.reach + (terrain ? sink + 1 : 0));
+  // Field, weights, rates of smoothing, the field before and after; the ground's distance, share and normals; numbers at nodes.
+  const double per_block = kVoxels * sizeof(float) * (terrain ? 11.0 : 6.0) + 1500;
+  const std::uint64_t available = available_memory();
+  const std::size_t most = available > 0 ? static_cast<std::size_t>(static_cast<double>(available) / per_block) : std::numeric_limits<std::size_t>::max();
+  std::optional<Blocks> blocks = blocks_around(s.particles, s.reach + (terrain ? sink + 1 : 0), most);
+  if (!blocks)
+    throw ResourceError(fmt::format("the level set of {} particles needs more than the {:.3g} GB of memory that are free, at voxels of {:.4g}: larger voxels, or particles that lie closer together, would do",
+                                    points.size(), static_cast<double>(available) / 1e9, s.voxel));
+  s.blocks = *blocks;
   if (terrain) s.terrain = *terrain;
+  const float full = static_cast<float>(64 * kPi / 315) * std::pow(s.reach / d, 3.0f);  // W where particles are all round
   const float near_surface = 1 - (radius / s.reach) * (radius / s.reach);
   Making making{.kernel = options.kernel,
                 .raster = {.reach = s.reach, .spacing = d, .radius_factor = 2 * static_cast<float>(options.radius), .outside = s.outside},
                 .smoothing = static_cast<float>(options.smoothing) * d * d / 24,
                 .lone = near_surface * near_surface * near_surface,
+                .cover = {.factor = options.kernel == SurfaceKernel::kRound ? 2 * static_cast<float>(options.cover) : 0, .blend = kCoverBlend * d, .reach = s.reach, .all = kStandsOut * full, .none = kLiesFlat * full},
                 .sink = sink,
                 .terrain = terrain};
   making.sheet = static_cast<float>(kPi) / 4 * (s.reach / d) * (s.reach / d) * making.lone * near_surface;

@@ -25,6 +25,7 @@ struct LevelSetOptions {
   Real influence = 2;        ///< a particle is felt within influence * spacing
   SurfaceKernel kernel = SurfaceKernel::kRound;  ///< kAnisotropic: with smoothing 0, or edges are lost again
   Real radius = 0.6;         ///< of the sphere round a lone particle, in spacings (about (3/4pi)^(1/3) = 0.62 for equal volume)
+  Real cover = 0.44;         ///< kRound: of the ball round a particle that stands out, in units of twice its radius; 0: none. At most `radius`
   int smoothing = 2;         ///< passes of mean-curvature flow, each as far as one at voxel = spacing / 2 whatever the voxel
   Real sink = 0;             ///< [m] how far under the ground the surface ends; 0: one and a half voxels
   Real drop_volume = 0;      ///< closed pieces and closed bubbles smaller than this many particles' volume are dropped, filled
@@ -87,6 +88,11 @@ class SurfaceCache {
 /// particles); pieces that hold no particle are dropped; and smoothing acts only where a
 /// particle has neighbours, so that drops do not shrink away.
 ///
+/// Averages over two spacings round edges and corners off: the particle in the corner of a box lies 0.05 spacings under them, the corner
+/// 0.8 away. So a ball of 2 cover times its radius round each particle that has few others near is joined to it (cover_particles): in corners, on
+/// edges, at thin fronts, not on faces; its rim is rounded widely, so that the surface passes half a spacing from it. Particles that fill a solid as a liquid does then show it to within half a spacing everywhere,
+/// at any voxel up to half a spacing (`effuse study skin`).
+///
 /// Then cut at the ground: at a height g over it, in spacings, the field is the least of those at max(g, 1/2), max(g, 3/4) and
 /// max(g, 1) along the ground's normal, so that lava stands straight on the ground, also on ground so rough that its lowest
 /// particles float a spacing over it; and it ends `sink` under the ground, so that no gap
@@ -96,7 +102,7 @@ class SurfaceCache {
 /// number of threads, whatever the order of the points. Empty points: an empty level set.
 ///   volume  particles' total volume [m^3], used when options.match_volume
 /// Throws InputError for positions or radii that are not finite, a radius <= 0, or particles so far apart that the voxels
-/// cannot be numbered (a million in a row).
+/// cannot be numbered (a million in a row); ResourceError, before any field is made, where the voxels would not fit into the memory that is free.
 /// Source: Zhu & Bridson 2005, ACM Trans. Graph. 24, 965-972.
 ///   last  values are taken from it where no particle has moved, come or gone nearby, and it is left for the next frame. The result is
 ///         the same, to the bit. The terrain must be the one of the frames before, at the same address and unchanged

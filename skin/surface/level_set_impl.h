@@ -61,6 +61,22 @@ void lift_to_ground(const Blocks& blocks, float outside, float lift, const Groun
 int smoothing_steps(float time);
 void smooth(const Blocks& blocks, float outside, float time, const Field& weight, float lone, float sheet, Field& phi);
 
+/// A ball round each particle that stands out, joined to the field.
+struct Cover {
+  float factor = 0;         ///< of a ball, in its particle's radii; 0: none
+  float blend = 1;          ///< [voxels], > 0
+  float reach = 4;          ///< R of rasterize.h
+  float all = 0, none = 1;  ///< particles where W is up to `all` have a whole ball, from `none` on they have none; all < none
+};
+/// With rho_i = s factor r_i, s falling from 1 to 0 as W at the particle goes from `all` to `none`, and b = min |x - x_i| - rho_i,
+///
+///   phi = min(phi, b) - max(0, blend - |phi - b|)^2 / (4 blend)
+///
+/// within kCoverBand of a ball; the square rounds the edge between ball and field. Where balls of different sizes meet b is that of the least
+/// |x - x_i|^2 - rho_i^2. A voxel feels particles within factor r_i + kCoverBand + R.
+void cover_particles(const ParticleGrid& particles, const Blocks& blocks, float outside, const Cover& cover, Field& phi);
+inline constexpr float kCoverBand = 2;
+
 /// Volumes of blocks that the last frame knows, by shift in steps: out, those of this frame.
 struct KnownVolumes {
   const std::map<int, std::vector<Real>>* last = nullptr;

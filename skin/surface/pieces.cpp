@@ -146,14 +146,21 @@ std::vector<std::uint8_t> drop_pieces(const Blocks& blocks, const ParticleGrid& 
     Real volume = 0;       // [voxels], with a soft edge, the field's slope taken as one
   };
   std::vector<Piece> pieces(first[n]);
+  Index home = kNone;  // of the particle before: the next one is often in the same block
   for (const Vec3& x : particles.x()) {
-    const Vec3 low = x.array().floor();
-    Index b = blocks.block_at(low);
+    const int i = static_cast<int>(std::floor(x.x())), j = static_cast<int>(std::floor(x.y())), k = static_cast<int>(std::floor(x.z()));
+    const auto is_at = [&](Index b) { return blocks.coords()[b][0] == i >> 3 && blocks.coords()[b][1] == j >> 3 && blocks.coords()[b][2] == k >> 3; };
+    if (home == kNone || !is_at(home)) home = blocks.block_at(Vec3(i, j, k));
+    if (home == kNone) continue;
+    Index last_block = kNone, last_set = kNone;
     for (int corner = 0; corner < 8; ++corner) {
-      const int i = static_cast<int>(low.x()) + (corner >> 2), j = static_cast<int>(low.y()) + ((corner >> 1) & 1), k = static_cast<int>(low.z()) + (corner & 1);
-      if (b == kNone || blocks.coords()[b] != BlockCoord{i >> 3, j >> 3, k >> 3}) b = blocks.block_at(Vec3(i, j, k));
+      const int a = (i & 7) + (corner >> 2), c = (j & 7) + ((corner >> 1) & 1), e = (k & 7) + (corner & 1);
+      const Index b = blocks.around(home)[static_cast<std::size_t>(13 + 9 * (a >> 3) + 3 * (c >> 3) + (e >> 3))];
       if (b == kNone) continue;
-      pieces[sets.root(first[b] + Index{in[b].at(voxel_index(i & 7, j & 7, k & 7))})].settled = true;
+      const Index set = in[b].at(voxel_index(a & 7, c & 7, e & 7));
+      if (b == last_block && set == last_set) continue;
+      last_block = b, last_set = set;
+      pieces[sets.root(first[b] + set)].settled = true;
     }
   }
   if (least > 0)

@@ -331,31 +331,6 @@ void rasterize_fine(const ParticleGrid& particles, const Blocks& blocks, const R
 
 }  // namespace
 
-Blocks blocks_around(const ParticleGrid& particles, Real reach) {
-  ZONE("skin.blocks");
-  const auto block = [](Real v) { return static_cast<int>(std::floor(v / kSide)); };
-  KeyTable seen;
-  std::vector<BlockCoord> coords;
-  for (const ParticleGrid::Column& column : particles.columns()) {
-    Box3 box;
-    for (Index p = column.begin; p < column.end; ++p) box.extend(particles.x()[p]);
-    const int x0 = block(box.min().x() - reach), x1 = block(box.max().x() + reach);
-    const int y0 = block(box.min().y() - reach), y1 = block(box.max().y() + reach);
-    // Heights rise along the column: every block up to `done` has been seen to.
-    int done = block(box.min().z() - reach) - 1;
-    for (Index p = column.begin; p < column.end; ++p) {
-      const Real z = particles.x()[p].z();
-      const int z1 = block(z + reach);
-      for (int c = std::max(done + 1, block(z - reach)); c <= z1; ++c)
-        for (int a = x0; a <= x1; ++a)
-          for (int b = y0; b <= y1; ++b)
-            if (seen.number(pack(a, b, c)) == coords.size()) coords.push_back({a, b, c});
-      done = std::max(done, z1);
-    }
-  }
-  return Blocks(std::move(coords));
-}
-
 void rasterize(const ParticleGrid& particles, const Blocks& blocks, const RasterOptions& options, Field& phi, Field& weight) {
   ZONE("skin.rasterize");
   phi.resize(blocks.size() * kVoxels);

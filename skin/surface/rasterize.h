@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "skin/surface/blocks.h"
 #include "skin/surface/particle_grid.h"
 
@@ -17,7 +19,8 @@ struct RasterOptions {
 /// of the sums is right to 1e-3 of them.
 inline constexpr float kFineReach = 8;
 
-/// The blocks with a voxel closer than reach to a particle.
+/// The blocks with a voxel closer than reach to a particle. No value: there would be more than `most`; looked for no further.
+std::optional<Blocks> blocks_around(const ParticleGrid& particles, Real reach, std::size_t most);
 Blocks blocks_around(const ParticleGrid& particles, Real reach);
 
 /// Zhu & Bridson's field with the bound between separate particles (build_level_set's docstring):

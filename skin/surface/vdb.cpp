@@ -148,7 +148,12 @@ void name_by_content(const fs::path& file) {
 void write_vdb(const fs::path& file, const LevelSet& surface, const std::vector<std::pair<std::string, std::string>>& metadata) {
   ZONE("skin.write_vdb");
   openvdb::initialize();
-  const openvdb::GridPtrVec grids = grids_of(surface.impl());
+  openvdb::GridPtrVec grids;
+  try {
+    grids = grids_of(surface.impl());
+  } catch (const openvdb::ArithmeticError& e) {
+    throw InputError(Place{file.string()}, fmt::format("voxels of {:.3g} cannot be written as OpenVDB ({}): positions and radii in a smaller unit would do", surface.voxel(), brief(e.what())));
+  }
   openvdb::MetaMap meta;
   for (const auto& [key, value] : metadata) meta.insertMeta(key, openvdb::StringMetadata(value));
 

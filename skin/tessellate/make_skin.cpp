@@ -1,5 +1,8 @@
 #include "skin/tessellate/make_skin.h"
 
+#include <algorithm>
+#include <cmath>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -14,7 +17,7 @@ namespace {
 
 using geometry::TriMesh;
 
-constexpr Real kThinnest = 10;  // [deg] thinner triangles are made wider,
+constexpr Real kThinnest = 14;  // [deg] thinner triangles are made wider,
 constexpr Real kWander = 0.35;  // [voxels] by moving vertices so far
 
 /// Of a tessellation whose triangles have regions: a vertex on a border gets that of the smallest id.
@@ -42,6 +45,35 @@ void coarsen_labelled(Skin& skin, Real error) {
   of.resize(report.kept.size());
   skin.report.coarsened = report.removed;
   skin.report.coarsen_error = report.error;
+}
+
+/// What the mesh is to enclose: what the level set was to, unless it could not; 0: nothing said.
+Real wanted_volume(const LevelSetReport& level_set) {
+  constexpr Real kReached = 0.05;
+  if (!(level_set.target > 0)) return 0;
+  return std::abs(level_set.residual) <= kReached ? level_set.target : level_set.volume;
+}
+
+/// The mesh's normals, shorter where triangles round the vertex look elsewhere: in creases and pinches, whose sides would cut through one another.
+std::vector<Vec3> ways_out(const TriMesh& mesh) {
+  constexpr Real kNowhere = 0.5, kFreely = 0.9;  // cosine of the worst triangle
+  std::vector<Real> least(mesh.positions.size(), 1);
+  for (const geometry::Triangle& t : mesh.triangles) {
+    const Vec3 up = (mesh.positions[t[1]] - mesh.positions[t[0]]).cross(mesh.positions[t[2]] - mesh.positions[t[0]]).normalized();
+    for (const Index v : t) least[v] = std::min(least[v], up.dot(mesh.normals[v]));
+  }
+  std::vector<Vec3> ways(mesh.normals);
+  for (std::size_t v = 0; v < ways.size(); ++v) ways[v] *= std::clamp((least[v] - kNowhere) / (kFreely - kNowhere), 0.0, 1.0);
+  return ways;
+}
+
+/// ways: of the smooth surface.
+void match_volume(Skin& skin, const std::vector<Vec3>& ways, const geometry::Terrain* terrain, Real spacing) {
+  constexpr Real kFarthest = 0.25, kOff = 0.25;
+  const Real wanted = wanted_volume(skin.report.level_set);
+  if (!(wanted > 0) || skin.mesh.positions.empty()) return;
+  const std::optional<Real> now = volume_above(skin.mesh, terrain);
+  if (now && std::abs(*now - wanted) < kOff * wanted) skin.report.volume = keep_volume(skin.mesh, ways, wanted, terrain, kFarthest * spacing);
 }
 
 }  // namespace
@@ -81,9 +113,11 @@ Skin make_skin(const geometry::Points& points, Real volume, const geometry::Terr
     if (detail) refined = refine_for(skin.mesh, *detail);
     skin.regions = label_vertices(skin.mesh, regions, points);
   }
+  const std::vector<Vec3> ways = ways_out(skin.mesh);
   if (detail) skin.report.displace = displace_only(skin.mesh, points, terrain, *detail);
   skin.report.displace.refined = refined.rounds;
   skin.report.refined_enough = refined.enough;
+  match_volume(skin, ways, terrain, spacing);
   if (options.coarsen > 0) coarsen_labelled(skin, options.coarsen * spacing);
   skin.report.shapes = triangle_shapes(skin.mesh);
   return skin;

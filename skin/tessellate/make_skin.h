@@ -9,6 +9,7 @@
 #include "geometry/terrain/terrain.h"
 #include "skin/detail/displace.h"
 #include "skin/surface/level_set.h"
+#include "skin/tessellate/keep_volume.h"
 #include "skin/tessellate/labels.h"
 #include "skin/tessellate/shapes.h"
 #include "skin/tessellate/voronoi.h"
@@ -37,6 +38,7 @@ struct SkinReport {
   LevelSetReport level_set;
   VoronoiReport voronoi;  ///< of kVoronoi, before it was refined
   DisplaceReport displace;
+  VolumeKept volume;           ///< of the mesh, before it was coarsened; all 0: not asked for
   bool refined_enough = true;  ///< RefineToReport::enough
   std::size_t coarsened = 0;   ///< vertices taken out
   Real coarsen_error = 0;      ///< [m] CoarsenReport::error
@@ -56,7 +58,11 @@ struct Skin {
 ///   last  as for mesh_level_set
 geometry::TriMesh tessellate_level_set(const LevelSet& surface, SurfaceCache* last = nullptr);
 
-/// Level set, tessellation, regions, detail, coarsening, as options ask.
+/// Level set, tessellation, regions, detail, volume, coarsening, as options ask.
+///
+/// With level_set.match_volume the mesh, too, displaced or not, encloses the particles' volume: its vertices are moved along the smooth
+/// surface's normals by one distance (keep_volume), a quarter of a spacing at most. Not where a volume is a quarter and more off: then it is
+/// not the mesh's doing (a roof over the lava, particles that overlap).
 ///
 /// The surface particles are those that are nearest to a vertex of the smooth surface: kLevelSet of the mesh refined, kVoronoi of the level
 /// set's own mesh. Each has one region, nobody else has any. kLevelSet: vertices know theirs, also after displacement (a

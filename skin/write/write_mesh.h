@@ -22,9 +22,10 @@ using Metadata = std::vector<std::pair<std::string, std::string>>;
 
 /// Binary little-endian PLY: x y z float, nx ny nz (always: flat shading without), red green blue uchar sRGB from
 /// "color", every other attribute as float scalars of its name (velocity_x, ...). Faces: `list uchar uint
-/// vertex_indices`. Metadata as comments, all before the first element (some readers refuse later ones). kDouble: x y z double.
-enum class PlyPositions { kFloat, kDouble };
-void write_ply(const std::filesystem::path& file, const geometry::TriMesh& mesh, const Metadata& metadata = {}, PlyPositions positions = PlyPositions::kFloat);
+/// vertex_indices`. Metadata as comments, all before the first element (some readers refuse later ones).
+void write_ply(const std::filesystem::path& file, const geometry::TriMesh& mesh, const Metadata& metadata = {});
+/// The same with x y z double.
+void write_exact_ply(const std::filesystem::path& file, const geometry::TriMesh& mesh, const Metadata& metadata = {});
 
 /// The same with the regions: of each vertex, and of each triangle where labels has them, the id of the particle whose region it is
 /// in as `uint region`, its lower 32 bits; and where there are ids of more than that, `uint region_high`: id = region + 2^32 region_high.

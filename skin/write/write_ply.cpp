@@ -69,7 +69,7 @@ void check_labels(const RegionLabels& labels, const TriMesh& mesh) {
 
 constexpr const char* kRegionNames[] = {"region", "region_high"};
 
-void write(const std::filesystem::path& file, const TriMesh& mesh, const RegionLabels* labels, const Metadata& metadata, PlyPositions precision) {
+void write(const std::filesystem::path& file, const TriMesh& mesh, const RegionLabels* labels, const Metadata& metadata, bool exact) {
   ZONE("write.ply");
   require_well_formed(file.string(), mesh);
   if (labels) check_labels(*labels, mesh);
@@ -85,7 +85,6 @@ void write(const std::filesystem::path& file, const TriMesh& mesh, const RegionL
   if (regions.beyond_float) out += "comment region: whole numbers above 2^24, which readers that keep them as float round\n";
   out += fmt::format("element vertex {}\n", n);
   std::set<std::string> taken;
-  const bool exact = precision == PlyPositions::kDouble;
   for (const std::string name : {"x", "y", "z", "nx", "ny", "nz"}) {
     out += fmt::format("property {} {}\n", exact && name.size() == 1 ? "double" : "float", name);
     taken.insert(name);
@@ -154,12 +153,12 @@ void write(const std::filesystem::path& file, const TriMesh& mesh, const RegionL
 
 }  // namespace
 
-void write_ply(const std::filesystem::path& file, const TriMesh& mesh, const Metadata& metadata, PlyPositions positions) {
-  write(file, mesh, nullptr, metadata, positions);
-}
+void write_ply(const std::filesystem::path& file, const TriMesh& mesh, const Metadata& metadata) { write(file, mesh, nullptr, metadata, false); }
+
+void write_exact_ply(const std::filesystem::path& file, const TriMesh& mesh, const Metadata& metadata) { write(file, mesh, nullptr, metadata, true); }
 
 void write_skin_ply(const std::filesystem::path& file, const TriMesh& mesh, const RegionLabels& labels, const Metadata& metadata) {
-  write(file, mesh, &labels, metadata, PlyPositions::kFloat);
+  write(file, mesh, &labels, metadata, false);
 }
 
 }  // namespace effuse::skin

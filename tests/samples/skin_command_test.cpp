@@ -278,7 +278,7 @@ TEST_F(SkinCommandTest, TheSurfaceThresholdPutsAFlatSurfaceWhereTheDensityFallsT
 TEST_F(SkinCommandTest, AFailedCheckIsExitCodeOneAndTheFileIsThereToLookAt) {
   // A sponge, its triangles taken out to a whole spacing: walls cross.
   std::string sponge;
-  for (std::uint64_t n = 0; n < 1500; ++n) sponge += fmt::format("{:.4f} {:.4f} {:.4f}\n", 3 * random_uniform(1, 0, n), 3 * random_uniform(1, 1, n), 3 * random_uniform(1, 2, n));
+  for (std::uint64_t n = 0; n < 1500; ++n) sponge += fmt::format("{:.4f} {:.4f} {:.4f}\n", 4 * random_uniform(1, 0, n), 4 * random_uniform(1, 1, n), 4 * random_uniform(1, 2, n));
   write("sponge.xyz", sponge);
   const Arguments cloud = {"sponge.xyz", "-r", "0.125"};
   const auto with = [&](Arguments more) {
@@ -294,7 +294,7 @@ TEST_F(SkinCommandTest, AFailedCheckIsExitCodeOneAndTheFileIsThereToLookAt) {
   EXPECT_EQ(as_json.code, 1);
   EXPECT_FALSE(json::parse(as_json.out).at("ok").get<bool>());
   EXPECT_GT(json::parse(as_json.out).at("frames").at(0).at("check").at("self_intersections").get<int>(), 0);
-  EXPECT_EQ(with({"-o", "sponge.ply", "--check"}).code, 0) << "as it is";
+  EXPECT_EQ(with({"-o", "sponge.ply", "--check", "--match-volume", "off"}).code, 0) << "as it is";
 }
 
 TEST_F(SkinCommandTest, BrokenFilesAndWrongNamesAreExitCodeTwoAndLeaveNothing) {
@@ -587,6 +587,72 @@ TEST_F(SkinCommandTest, RefusesDetailThatNothingWouldShow) {
     EXPECT_TRUE(contains(outcome.err, c.says)) << "'" << outcome.err << "' instead of '" << c.says << "'";
     EXPECT_EQ(files(), 1u) << c.says;
   }
+}
+
+/// 4 x 4 x 4 particles, a unit apart.
+std::string block_of_lattice() {
+  std::string block;
+  for (int n = 0; n < 64; ++n) block += fmt::format("{} {} {}\n", n % 4, n / 4 % 4, n / 16);
+  return block;
+}
+
+TEST_F(SkinCommandTest, WhatContradictsItselfIsExitCodeTwoWithTheReason) {
+  write("block.xyz", block_of_lattice());
+  const auto refused = [&](Arguments arguments, const std::string& reason) {
+    const Outcome outcome = skin(arguments);
+    EXPECT_EQ(outcome.code, 2) << reason;
+    EXPECT_TRUE(contains(outcome.err, reason)) << outcome.err;
+    EXPECT_FALSE(fs::exists(folder_ / "x.vdb")) << reason;
+    EXPECT_FALSE(fs::exists(folder_ / "x.ply")) << reason;
+  };
+  refused({"block.xyz", "-r", "0.5", "-o", "x.vdb", "--tessellation", "voronoi"}, "--tessellation voronoi goes with a mesh");
+  refused({"block.xyz", "-r", "0.5", "-o", "x.vdb", "--coarsen", "0.1"}, "--coarsen goes with a mesh");
+  refused({"block.xyz", "-r", "0.5", "-o", "x.ply", "-s", "3", "-e", "2"}, "--start-index 3 is beyond --end-index 2");
+  refused({"block.xyz", "-r", "0.5", "-o", "x.ply", "-s", "3"}, "is one file: --start-index and --end-index go with a sequence");
+  refused({"block.xyz", "-r", "1e300", "-o", "x.ply"}, "a particle radius of 1e+300 (--particle-radius): wanted 1e-06 to 1e+06");
+  refused({"block.xyz", "-r", "0.5", "-o", "x.ply", "--kind", "aa", "--seed", "99999999999999999999999"}, "must be a whole number");
+  refused({"block.xyz", "-r", "0.5", "-o", "x.ply", "--kind", "aa", "--seed", "-1"}, "must be a whole number");
+  // Nothing is there to be made a folder of.
+  const Outcome inside_a_file = skin({"block.xyz", "-r", "0.5", "-o", "block.xyz/x.ply"});
+  EXPECT_EQ(inside_a_file.code, 2) << inside_a_file.err;
+}
+
+TEST_F(SkinCommandTest, TemperaturesThatNoLavaHasAreRefusedWithTheParticle) {
+  const auto with = [&](const std::string& temperature, Arguments more) {
+    write("hot.ply", "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\nproperty float temperature\nend_header\n0 0 0 1200\n1 0 0 " + temperature + "\n");
+    more.insert(more.begin(), {"hot.ply", "-r", "0.5", "-o", "x.ply"});
+    return skin(more);
+  };
+  for (const std::string bad : {"-20", "1e9", "nan"}) {
+    const Outcome outcome = with(bad, {"--kind", "aa"});
+    EXPECT_EQ(outcome.code, 2) << bad;
+    EXPECT_TRUE(contains(outcome.err, "particle 1 has a temperature of ") || contains(outcome.err, "nan")) << outcome.err;
+  }
+  EXPECT_TRUE(contains(with("-20", {"--kind", "aa"}).err, "is it in degrees Celsius?"));
+  EXPECT_EQ(with("nan", {}).code, 2);
+  EXPECT_EQ(with("-20", {}).code, 0) << "carried as it is, and used for nothing";
+}
+
+TEST_F(SkinCommandTest, AnEmptyMeshIsSaid) {
+  write("block.xyz", block_of_lattice());
+  const Outcome boxed = skin({"block.xyz", "-r", "0.5", "-o", "x.ply", "--particle-aabb-min", "100", "100", "100", "--particle-aabb-max", "101", "101", "101"});
+  EXPECT_EQ(boxed.code, 0);
+  EXPECT_TRUE(contains(boxed.err, "no particle in the box")) << boxed.err;
+  const Outcome dropped = skin({"block.xyz", "-r", "0.5", "-o", "x.ply", "--drop-volume", "1e6"});
+  EXPECT_EQ(dropped.code, 0);
+  EXPECT_TRUE(contains(dropped.err, "smaller than --drop-volume")) << dropped.err;
+}
+
+TEST_F(SkinCommandTest, ScatteredParticlesThatWouldNotFitIntoMemoryAreExitCodeFiveAtOnce) {
+  // Each stands alone among a thousand blocks of voxels: some 70 GB.
+  std::string dust;
+  for (std::uint64_t n = 0; n < 4'000; ++n) dust += fmt::format("{:.0f} {:.0f} {:.0f}\n", 90'000 * random_uniform(1, 0, n), 90'000 * random_uniform(1, 1, n), 90'000 * random_uniform(1, 2, n));
+  write("dust.xyz", dust);
+  const Outcome outcome = skin({"dust.xyz", "-r", "1", "-c", "0.2", "-l", "4", "-o", "x.obj"});
+  if (outcome.code == 0) GTEST_SKIP() << "a machine that has as much";
+  EXPECT_EQ(outcome.code, 5) << outcome.err;
+  EXPECT_TRUE(contains(outcome.err, " GB of memory that are free")) << outcome.err;
+  EXPECT_FALSE(fs::exists(folder_ / "x.obj"));
 }
 
 TEST_F(SkinCommandTest, TheSameBytesOnOneAndTwoThreads) {

@@ -20,7 +20,7 @@ namespace effuse::skin::skin_checks {
 /// half a spacing apart miss smaller ones (one particle in two hundred has such a one).
 inline constexpr Real kFootMargin = 0.2;
 /// Deeper than `sink` by no more than this [spacings]: a dual mesh's vertices lie off the level set by so much at its lower edge.
-inline constexpr Real kDeeper = 0.1;
+inline constexpr Real kDeeper = 0.12;
 
 /// Share of the triangles whose least angle is under 5 degrees, and how many look away from the skin round them.
 inline Real share_of_thin(const geometry::TriMesh& mesh) {

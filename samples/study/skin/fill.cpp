@@ -12,8 +12,9 @@ namespace effuse::study {
 
 namespace {
 
-constexpr Real kMoved = 0.35, kApart = 0.95, kUnder = 0.45, kSlack = 0.02;  // [spacings]
-constexpr int kRounds = 30, kShifts = 8;
+// [spacings]; kPressed: more than the mean distance of neighbours, so that all are pressed on, and pressed against the walls.
+constexpr Real kMoved = 0.35, kPressed = 1.25, kYield = 0.25, kUnder = 0.45, kSlack = 0.02;
+constexpr int kRounds = 60, kShifts = 8;
 
 std::vector<Vec3> lattice(const Box3& box, const std::function<Real(const Vec3&)>& distance, const Vec3& shift) {
   std::vector<Vec3> x;
@@ -41,17 +42,19 @@ struct Particle {
 std::vector<Vec3> pushed_apart(const std::vector<Vec3>& x, const std::function<Real(const Vec3&)>& distance) {
   std::vector<Particle> particles;
   for (std::size_t i = 0; i < x.size(); ++i) particles.push_back({x[i], static_cast<Index>(i)});
-  const skin::NearGrid<Particle> grid(std::move(particles), 1);
+  const skin::NearGrid<Particle> grid(std::move(particles), kPressed);
   std::vector<Vec3> moved(x.size());
   parallel_for(x.size(), [&](std::size_t i) {
     Vec3 p = x[i];
-    grid.each_near(x[i], kApart, [&](const Particle& other) {
+    grid.each_near(x[i], kPressed, [&](const Particle& other) {
       const Vec3 d = x[i] - other.x;
       const Real length = d.norm();
-      if (length > 0 && length < kApart) p += (0.5 * (kApart - length) / length) * d;
+      if (length > 0 && length < kPressed) p += (kYield * (kPressed - length) / length) * d;
     });
-    // Where the distance has no slope there is nowhere to go.
-    if (const Real too_near = distance(p) + kUnder; too_near > 0) {
+    // Where the distance has no slope there is nowhere to go. Three times: in a corner each takes it from one wall.
+    for (int wall = 0; wall < 3; ++wall) {
+      const Real too_near = distance(p) + kUnder;
+      if (too_near <= 0) break;
       const Vec3 slope = slope_of(distance, p);
       if (slope.norm() > 0.1) p -= (too_near / slope.squaredNorm()) * slope;
     }

@@ -106,7 +106,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Wrong{"[[body]]\nball = 1\nposition = [0, 0, 1]\ndensity = 1\nstep = [0, 0, 1]", "goes with copies"},
                     Wrong{"[[body]]\nball = 1\nposition = [0, 0, 1]\ndensity = 1\n[bodies]\ncontact = \"penaltie\"", "did you mean 'penalty'?"},
                     Wrong{"[[body]]\nball = 1\nposition = [0, 0, 1]\ndensity = 1\n[bodies]\nsubstep = 3", "did you mean 'substeps'?"},
-                    Wrong{"[[obstacle]]\nbox = [1, 1, 1]\nposition = [0, 0, 0]\n[bodies]\nsubsteps = 3", "the scene has none"}, Wrong{"", "wanted at least one of [lava], [[body]]"}));
+                    Wrong{"[[obstacle]]\nbox = [1, 1, 1]\nposition = [0, 0, 0]\n[bodies]\nsubsteps = 3", "the scene has none"}, Wrong{"", ", [[body]]"}));
 
 TEST(SceneBodies, AMisspeltFormIsToldWithTheNameItMeant) {
   std::vector<std::string> faults;

@@ -3,12 +3,17 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
+#include <filesystem>
 #include <limits>
 
 #include "geometry/base/parallel.h"
 #include "geometry/mesh/validate.h"
 #include "geometry/terrain/delaunay_internal.h"
+#include "importers/terrain/import_dem.h"
+#include "importers/terrain/import_terrain.h"
 #include "tests/geometry/terrain/fields.h"
+#include "tests/importers/test_files.h"
 
 namespace effuse::geometry {
 namespace {
@@ -117,6 +122,22 @@ TEST(Triangulate, TakesNoMoreTrianglesThanPlainGreedyInsertion) {
   for (const auto& [field, error] : {std::pair{&whau, 5.0}, {&whau, 2.0}, {&small, 1.0}}) {
     const Real ours = static_cast<Real>(triangulate(*field, error).triangles.size()), plain = static_cast<Real>(plain_greedy_triangles(*field, error));
     EXPECT_NEAR(ours / plain, 1, 0.03) << ours << " against " << plain << ": ties may fall otherwise";
+  }
+}
+
+TEST(TriangulateSlow, OnAvaAlrAndMaungaWhauToo) {
+  const std::filesystem::path data = importers::shared_data();
+  if (data.empty()) GTEST_SKIP() << "no shared data on this machine (EFFUSE_SHARED_DATA)";
+  importers::DemOptions filled;
+  filled.holes = importers::HolePolicy::kFill;
+  for (const auto& [name, error] : {std::pair{"avaAlr.tif", 20.0}, {"avaAlr.tif", 10.0}, {"maunga-whau.asc", 1.0}}) {
+    const geometry::Terrain terrain = importers::terrain_from_grid(importers::import_dem({data / "terrain" / name}, filled), name).terrain;
+    const HeightField& field = *terrain.height_field();
+    const TriMesh mesh = triangulate(field, error);
+    const Real ours = static_cast<Real>(mesh.triangles.size()), plain = static_cast<Real>(plain_greedy_triangles(field, error));
+    EXPECT_LT(ours / plain, 1.05) << name << ": ties may fall otherwise; 1.5 is asked for";
+    EXPECT_LE(vertical_error(field, mesh).at_posts, error + 1e-7);
+    std::printf("%s to %g m: %.0f triangles, plain greedy insertion %.0f\n", name, error, ours, plain);
   }
 }
 

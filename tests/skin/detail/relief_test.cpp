@@ -390,13 +390,15 @@ TEST(Relief, TwoMeshesOfOneSurfaceAreMovedAlike) {
   options.edge = 0.15;
   displace(fine, skin.lava.points(), nullptr, options);
   // The first vertices are in both; the finer mesh's octaves were left out of neither.
-  Real most = 0, sum = 0;
+  std::size_t differ = 0;
+  Real sum = 0;
   for (std::size_t i = 0; i < skin.mesh.positions.size(); ++i) {
     const Real apart = (coarse.positions[i] - fine.positions[i]).norm();
-    most = std::max(most, apart);
+    differ += apart > 0.02;
     sum += apart;
   }
-  EXPECT_LT(most, 0.02);
+  // Where a triangle of one of them would have turned over, its corners are held back.
+  EXPECT_LE(differ, skin.mesh.positions.size() / 1000);
   EXPECT_LT(sum / static_cast<Real>(skin.mesh.positions.size()), 0.002);
 }
 

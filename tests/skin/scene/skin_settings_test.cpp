@@ -31,6 +31,14 @@ geometry::Terrain ridge(const Vec3& origin = Vec3(2'667'400, 6'478'700, 100)) {
   return geometry::Terrain::from_height_field(geometry::HeightField(Vec2(0, 0), Vec2(5, 5), 21, 21, std::move(heights)), geometry::Georeference{origin, ""});
 }
 
+TEST(SkinSettings, CoverIsReadAndNoLargerThanALoneParticlesRadius) {
+  EXPECT_EQ(read("").level_set.cover, LevelSetOptions{}.cover);
+  EXPECT_EQ(read("[skin]\ncover = 0").level_set.cover, 0);
+  EXPECT_EQ(read("[skin]\ncover = 0.5").level_set.cover, 0.5);
+  EXPECT_THROW(read("[skin]\ncover = 0.7"), InputError);
+  EXPECT_THROW(read("[skin]\ncovr = 0.4"), InputError);
+}
+
 TEST(PreviewCamera, StandsAtItsDistanceFromATargetOnTheGroundInTheTermsOfTheMap) {
   const SkinSettings s = read("[preview]\ntarget = [2667450, 6478750]\ndistance = \"20 m\"\nazimuth = \"90 deg\"\nelevation = \"30 deg\"\nfov = \"40 deg\"\nturn = \"10 deg/s\"");
   const geometry::Terrain terrain = ridge();

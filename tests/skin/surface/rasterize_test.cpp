@@ -22,6 +22,28 @@ Vec3 voxel_point(const Blocks& blocks, std::size_t b, std::size_t v) {
               kSide * c[2] + static_cast<int>(v & 7));
 }
 
+TEST(BlocksAround, AreThoseOfEveryParticlesColumnAndReachAndNoMore) {
+  // Every block with a voxel within reach of a particle is there; none that no particle's cube of that half-side, widened by its column's, touches.
+  for (const Real side : {2.0, 5.0}) {
+    Cloud cloud;
+    for (std::uint64_t i = 0; i < 300; ++i) cloud.add(Vec3(60 * random_uniform(5, 0, i) - 30, 60 * random_uniform(5, 1, i) - 30, (i < 200 ? 6 : 90) * random_uniform(5, 2, i) - 3), 1);
+    for (std::uint64_t i = 0; i < 5; ++i) cloud.add(Vec3(4000 * random_uniform(6, 0, i), -9000, 0), 1);  // strays: rows by hash
+    const ParticleGrid particles(cloud.bare(), 1, side);
+    constexpr Real kReach = 3.7;
+    const Blocks blocks = blocks_around(particles, kReach);
+    const auto touches = [&](const BlockCoord& c, Real reach) {
+      const Vec3 low(kSide * c[0], kSide * c[1], kSide * c[2]), high = low + Vec3::Constant(kSide);
+      return std::any_of(particles.x().begin(), particles.x().end(), [&](const Vec3& x) { return ((low - x).array() <= reach).all() && ((x - high).array() <= reach).all(); });
+    };
+    for (const BlockCoord& c : blocks.coords()) EXPECT_TRUE(touches(c, kReach + side)) << c[0] << " " << c[1] << " " << c[2];
+    for (const Vec3& x : particles.x())
+      for (int corner = 0; corner < 27; ++corner)
+        EXPECT_NE(blocks.block_at(x + 0.999 * kReach * Vec3(corner / 9 - 1, corner / 3 % 3 - 1, corner % 3 - 1)), kNone) << x.transpose();
+    EXPECT_TRUE(blocks_around(particles, kReach, blocks.size()).has_value());
+    EXPECT_FALSE(blocks_around(particles, kReach, blocks.size() - 1).has_value());
+  }
+}
+
 TEST(Rasterize, AgreesWithTheSumOverAllParticlesInDouble) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     Cloud cloud;
