@@ -9,6 +9,7 @@
 #include "geometry/base/check.h"
 #include "geometry/base/parallel.h"
 #include "geometry/base/zones.h"
+#include "geometry/collide/swept.h"
 
 namespace effuse::flow::sph {
 
@@ -164,6 +165,56 @@ void Solids::add_walls(std::span<const Vec3> x, Real reach, Walls& walls) {
   merged_.first.back() = place;
   std::swap(walls.first, merged_.first);
   std::swap(walls.walls, merged_.walls);
+}
+
+void Solids::part(std::span<const Vec3> x, Real reach, const Walls& walls, Neighbors& neighbors) {
+  ZONE("sph.solids");
+  if (!any() || near_.empty()) return;
+  const geometry::Obstacles& obstacles = *options_.obstacles;
+  const auto beyond = [&](Index i, const Vec3& at) {
+    return std::any_of(walls[i].begin(), walls[i].end(), [&](const Wall& wall) { return wall.mirrors && wall.reach + wall.normal.dot(at - x[i]) < 0; });
+  };
+  // Of a pair one may have no wall within its reach: it is asked about from both ends, and told to both.
+  flags_.assign(x.size(), 0);
+  parallel_for(near_.size(), [&](std::size_t q) {
+    const Index i = near_[q];
+    flags_[i] = std::any_of(neighbors[i].begin(), neighbors[i].end(), [&](Index j) { return beyond(i, x[j]); });
+  }, 64);
+  std::vector<Index> asked;
+  for (const Index i : near_)
+    if (flags_[i]) asked.push_back(i);
+  if (asked.empty()) return;
+  std::vector<std::vector<Index>> hidden(asked.size());
+  parallel_for(asked.size(), [&](std::size_t k) {
+    const Index i = asked[k];
+    std::vector<Index> meeting;
+    obstacles.meeting(Box3(x[i] - Vec3::Constant(reach), x[i] + Vec3::Constant(reach)), meeting);
+    for (const Index j : neighbors[i]) {
+      if (!beyond(i, x[j])) continue;
+      const Index low = std::min(i, j), high = std::max(i, j);
+      for (const Index o : meeting) {
+        const geometry::RigidPose& pose = obstacles[o].motion.to();
+        if (!geometry::sweep(obstacles[o].shape, pose.body(x[low]), pose.body(x[high]), 0)) continue;
+        hidden[k].push_back(j);
+        break;
+      }
+    }
+  }, 16);
+  // Who is hidden from whom, both ways, sorted.
+  std::vector<std::uint64_t> pairs;
+  const auto key = [](Index i, Index j) { return (static_cast<std::uint64_t>(i) << 32) | j; };
+  for (std::size_t k = 0; k < asked.size(); ++k)
+    for (const Index j : hidden[k]) {
+      pairs.push_back(key(asked[k], j));
+      pairs.push_back(key(j, asked[k]));
+    }
+  std::sort(pairs.begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+  std::vector<Index> which;
+  for (const std::uint64_t pair : pairs)
+    if (const auto i = static_cast<Index>(pair >> 32); which.empty() || which.back() != i) which.push_back(i);
+  neighbors.drop(which, [&](std::size_t k, Index j) { return std::binary_search(pairs.begin(), pairs.end(), key(which[k], j)); });
+  COUNT("sph.parted pairs", pairs.size() / 2);
 }
 
 bool Solids::disturbs(const Vec3& x, Real reach, Real speed) const {

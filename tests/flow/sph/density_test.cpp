@@ -70,10 +70,11 @@ TEST_P(FilmShape, GivesItsWallsTheFrictionOfItsDepth) {
   }
 }
 
-// Lava above that has no wall in reach sees the surface for them.
+// On an obstacle lava above that has no wall in reach sees the surface for them.
 TEST(FilmShapeOfMiddlingDepth, TellsTheDepthToThoseWhoSeeNoSurface) {
   for (const int layers : {5, 6}) {
     SampleSystem s = film(layers, 0, 3);
+    for (Wall& wall : s.walls.walls) wall.mirrors = true;
     shape_of(s);
     for (const Wall& wall : s.walls.walls) EXPECT_NEAR(wall.friction, s.film.film(layers * s.dx), 2e-3) << layers;
   }
