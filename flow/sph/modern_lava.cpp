@@ -297,7 +297,7 @@ struct ModernLava::Impl {
       walls.first[k + 1] = static_cast<Index>(walls.walls.size());
     }
     solids.add_walls(lx, support, walls);
-    if (o.period.isZero()) solids.part(lx, support, walls, neighbors);
+    if (o.period.isZero()) solids.part(lx, walls, neighbors);
   }
 
   /// Everything that depends on positions alone.

@@ -22,6 +22,7 @@ Box3 widened(Box3 box, Real by) {
 }
 
 constexpr std::size_t kBlock = 64;  // particles that ask together first; they lie in memory as in space
+constexpr Real kAway = 0.5;          // cosine: faces of the two sides of a plate look away from each other
 constexpr std::size_t kFew = 16;    // obstacles near a block that each of its particles asks by itself
 
 /// Fills near with the numbers k, rising, of `count` boxes box(k) that meet the box place(obstacle), grown by `by` [m], of any obstacle (or
@@ -167,49 +168,44 @@ void Solids::add_walls(std::span<const Vec3> x, Real reach, Walls& walls) {
   std::swap(walls.walls, merged_.walls);
 }
 
-void Solids::part(std::span<const Vec3> x, Real reach, const Walls& walls, Neighbors& neighbors) {
+void Solids::part(std::span<const Vec3> x, const Walls& walls, Neighbors& neighbors) {
   ZONE("sph.solids");
   if (!any() || near_.empty()) return;
   const geometry::Obstacles& obstacles = *options_.obstacles;
-  const auto beyond = [&](Index i, const Vec3& at) {
-    return std::any_of(walls[i].begin(), walls[i].end(), [&](const Wall& wall) { return wall.mirrors && wall.reach + wall.normal.dot(at - x[i]) < 0; });
-  };
-  // Of a pair one may have no wall within its reach: it is asked about from both ends, and told to both.
-  flags_.assign(x.size(), 0);
-  parallel_for(near_.size(), [&](std::size_t q) {
-    const Index i = near_[q];
-    flags_[i] = std::any_of(neighbors[i].begin(), neighbors[i].end(), [&](Index j) { return beyond(i, x[j]); });
-  }, 64);
-  std::vector<Index> asked;
-  for (const Index i : near_)
-    if (flags_[i]) asked.push_back(i);
-  if (asked.empty()) return;
-  std::vector<std::vector<Index>> hidden(asked.size());
-  parallel_for(asked.size(), [&](std::size_t k) {
-    const Index i = asked[k];
-    std::vector<Index> meeting;
-    obstacles.meeting(Box3(x[i] - Vec3::Constant(reach), x[i] + Vec3::Constant(reach)), meeting);
-    for (const Index j : neighbors[i]) {
-      if (!beyond(i, x[j])) continue;
-      const Index low = std::min(i, j), high = std::max(i, j);
-      for (const Index o : meeting) {
-        const geometry::RigidPose& pose = obstacles[o].motion.to();
-        if (!geometry::sweep(obstacles[o].shape, pose.body(x[low]), pose.body(x[high]), 0)) continue;
-        hidden[k].push_back(j);
-        break;
-      }
+  // Each sees a face of the plate, and the other behind it. Round an edge they see faces that do not look away from each other.
+  const auto on_two_sides = [&](Index i, Index j) {
+    for (const Wall& mine : walls[i]) {
+      if (!mine.mirrors || mine.reach + mine.normal.dot(x[j] - x[i]) >= 0) continue;
+      for (const Wall& other : walls[j])
+        if (other.mirrors && other.reach + other.normal.dot(x[i] - x[j]) < 0 && mine.normal.dot(other.normal) < -kAway) return true;
     }
-  }, 16);
+    return false;
+  };
+  const auto stand_between = [&](Index i, Index j) {
+    std::vector<Index> meeting;
+    Box3 box(x[i], x[i]);
+    box.extend(x[j]);
+    obstacles.meeting(box, meeting);
+    return std::any_of(meeting.begin(), meeting.end(), [&](Index o) {
+      const geometry::RigidPose& pose = obstacles[o].motion.to();
+      return geometry::sweep(obstacles[o].shape, pose.body(x[i]), pose.body(x[j]), 0).has_value();
+    });
+  };
+  std::vector<std::vector<Index>> hidden(near_.size());  // of those with higher numbers
+  parallel_for(near_.size(), [&](std::size_t q) {
+    for (const Index j : neighbors[near_[q]])
+      if (j > near_[q] && on_two_sides(near_[q], j) && stand_between(near_[q], j)) hidden[q].push_back(j);
+  }, 64);
   // Who is hidden from whom, both ways, sorted.
   std::vector<std::uint64_t> pairs;
   const auto key = [](Index i, Index j) { return (static_cast<std::uint64_t>(i) << 32) | j; };
-  for (std::size_t k = 0; k < asked.size(); ++k)
-    for (const Index j : hidden[k]) {
-      pairs.push_back(key(asked[k], j));
-      pairs.push_back(key(j, asked[k]));
+  for (std::size_t q = 0; q < near_.size(); ++q)
+    for (const Index j : hidden[q]) {
+      pairs.push_back(key(near_[q], j));
+      pairs.push_back(key(j, near_[q]));
     }
+  if (pairs.empty()) return;
   std::sort(pairs.begin(), pairs.end());
-  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
   std::vector<Index> which;
   for (const std::uint64_t pair : pairs)
     if (const auto i = static_cast<Index>(pair >> 32); which.empty() || which.back() != i) which.push_back(i);
