@@ -60,6 +60,10 @@ class ModernLavaEffect final : public Effect {
   Real time() const override { return lava_.time(); }
 
   void step(Real t_end) override {
+    if (crammed_steps_ >= kMostCrammedSteps)
+      throw UnstableError(fmt::format("at t = {:.6g} s {} of {} particles have been pressed to more than 1.5 times their density for {} steps, around ({:.6g}, {:.6g}, {:.6g}): more lava is let in there than "
+                                      "there is room for, as in a closed room of obstacles; a way out, or a lower rate, would do",
+                                      time(), last_.crammed, lava_.size(), kMostCrammedSteps, origin_.x() + last_.crammed_at.x(), origin_.y() + last_.crammed_at.y(), origin_.z() + last_.crammed_at.z()));
     const Real wanted = longest_step(t_end - lava_.time());
     try {
       last_ = lava_.step(wanted);
@@ -82,6 +86,9 @@ class ModernLavaEffect final : public Effect {
     t.divergence_error = std::max(t.divergence_error, last_.divergence_error);
     t.viscosity_residual = std::max(t.viscosity_residual, last_.viscosity_residual);
     t.largest_density_error = std::max(t.largest_density_error, last_.density_error);
+    // A few are squeezed for a moment wherever something hits.
+    const bool crammed = last_.crammed >= kCrammedAtLeast && static_cast<Real>(last_.crammed) > kCrammedShare * static_cast<Real>(last_.awake);
+    crammed_steps_ = crammed ? crammed_steps_ + 1 : 0;
     if (heat_) book_heat();
   }
 
@@ -261,8 +268,15 @@ class ModernLavaEffect final : public Effect {
     io.value("awake", self.last_.awake);
     io.value("density_error", self.last_.density_error);
     io.value("max_speed", self.last_.max_speed);
+    io.value("crammed_steps", self.crammed_steps_);
+    io.value("crammed", self.last_.crammed);
   }
 
+  static constexpr std::size_t kCrammedAtLeast = 20;
+  static constexpr Real kCrammedShare = 0.05;
+  static constexpr std::uint64_t kMostCrammedSteps = 50;
+
+  std::uint64_t crammed_steps_ = 0;     // in a row
   std::unique_ptr<SolidWorld> solids_;  // lava_ refers to it
   ModernLava lava_;
   bool heat_;

@@ -6,6 +6,7 @@
 
 #include "flow/sph/simd.h"
 #include "geometry/base/check.h"
+#include "geometry/base/parallel.h"
 #include "geometry/base/types.h"
 
 namespace effuse::flow::sph {
@@ -93,6 +94,22 @@ class Neighbors {
 
   /// Keeps the lists of the first n; a neighbour j >= n is an image of image_of[j - n] < n, which takes its place.
   void fold(std::size_t n, std::span<const Index> image_of);
+
+  /// Takes out of the list of each which[k] those j for which hidden(k, j). In parallel; lists must stay mutual: what i loses must lose i.
+  template <class F>
+  void drop(std::span<const Index> which, F&& hidden) {
+    parallel_for(which.size(), [&](std::size_t k) {
+      const Index i = which[k];
+      Index* list = chunks_[chunk_[i]].data() + first_[i];
+      const Index count = count_[i];
+      Index kept = 0;
+      for (Index n = 0; n < count; ++n)
+        if (!hidden(k, list[n])) list[kept++] = list[n];
+      count_[i] = kept;
+      // The rest of the last group is i itself, as before.
+      for (Index n = kept; n < count; ++n) list[n] = i;
+    }, 64);
+  }
 
   std::size_t size() const { return count_.size(); }
   std::span<const Index> operator[](std::size_t i) const {

@@ -33,6 +33,7 @@ constexpr Real kFillUp = 0.2;        // share of a density that is too low that 
 constexpr Real kFailed = 10;          // times its tolerance: a solve that stays above has failed
 constexpr Real kSteep = 0.5;          // how far the shear rate at a wall lies from the mean over the support to the wall's own; 0.35: thin films hold on too hard, 1: too little
 constexpr Real kTight = 0.25;          // times dt sqrt(g / dx): share of the divergence tolerance that some iterations are spent on
+constexpr Real kCrammed = 0.5;        // too much of its density
 constexpr Real kSlow = 0.5;           // sqrt(g dx): slower lava all but stands
 constexpr Real kWake = 2;            // times sleep_speed
 constexpr int kNap = 16;             // steps of max_step that sleepers' heat takes at a time while nobody is awake
@@ -296,6 +297,7 @@ struct ModernLava::Impl {
       walls.first[k + 1] = static_cast<Index>(walls.walls.size());
     }
     solids.add_walls(lx, support, walls);
+    if (o.period.isZero()) solids.part(lx, walls, neighbors);
   }
 
   /// Everything that depends on positions alone.
@@ -533,6 +535,9 @@ struct ModernLava::Impl {
     std::vector<Real> excess(set.awake);
     parallel_for(set.awake, [&](std::size_t k) { excess[k] = std::max(shape.density[k] - 1, 0.0); }, 4096);
     report.density_error = rms(excess);
+    for (std::size_t k = 0; k < set.awake; ++k)
+      if (excess[k] > kCrammed && !fixed[k]) ++report.crammed, report.crammed_at += lx[k];
+    if (report.crammed > 0) report.crammed_at /= static_cast<Real>(report.crammed);
 
     for (;; ++report.retries, dt /= 2) {
       if (try_step(dt, report)) break;

@@ -63,6 +63,8 @@ struct ModernReport {
   Real viscosity_residual = 0; ///< relative, reached
   Real divergence_error = 0;   ///< rms of dt div v the pressure solve left
   Real density_error = 0;      ///< rms over particles of max(rho - rho0, 0) / rho0, before the step
+  std::size_t crammed = 0;     ///< awake particles of more than 1.5 times the density: lava finds no room where it is let in
+  Vec3 crammed_at = Vec3::Zero();  ///< their mean place
   Real max_speed = 0;          ///< [m/s]
   Real max_temperature = 0, min_temperature = 0;  ///< [K]
   geometry::SlideReport solids;  ///< particles that came near obstacles

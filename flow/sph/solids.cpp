@@ -9,6 +9,7 @@
 #include "geometry/base/check.h"
 #include "geometry/base/parallel.h"
 #include "geometry/base/zones.h"
+#include "geometry/collide/swept.h"
 
 namespace effuse::flow::sph {
 
@@ -21,6 +22,7 @@ Box3 widened(Box3 box, Real by) {
 }
 
 constexpr std::size_t kBlock = 64;  // particles that ask together first; they lie in memory as in space
+constexpr Real kAway = 0.5;          // cosine: faces of the two sides of a plate look away from each other
 constexpr std::size_t kFew = 16;    // obstacles near a block that each of its particles asks by itself
 
 /// Fills near with the numbers k, rising, of `count` boxes box(k) that meet the box place(obstacle), grown by `by` [m], of any obstacle (or
@@ -164,6 +166,51 @@ void Solids::add_walls(std::span<const Vec3> x, Real reach, Walls& walls) {
   merged_.first.back() = place;
   std::swap(walls.first, merged_.first);
   std::swap(walls.walls, merged_.walls);
+}
+
+void Solids::part(std::span<const Vec3> x, const Walls& walls, Neighbors& neighbors) {
+  ZONE("sph.solids");
+  if (!any() || near_.empty()) return;
+  const geometry::Obstacles& obstacles = *options_.obstacles;
+  // Each sees a face of the plate, and the other behind it. Round an edge they see faces that do not look away from each other.
+  const auto on_two_sides = [&](Index i, Index j) {
+    for (const Wall& mine : walls[i]) {
+      if (!mine.mirrors || mine.reach + mine.normal.dot(x[j] - x[i]) >= 0) continue;
+      for (const Wall& other : walls[j])
+        if (other.mirrors && other.reach + other.normal.dot(x[i] - x[j]) < 0 && mine.normal.dot(other.normal) < -kAway) return true;
+    }
+    return false;
+  };
+  const auto stand_between = [&](Index i, Index j) {
+    std::vector<Index> meeting;
+    Box3 box(x[i], x[i]);
+    box.extend(x[j]);
+    obstacles.meeting(box, meeting);
+    return std::any_of(meeting.begin(), meeting.end(), [&](Index o) {
+      const geometry::RigidPose& pose = obstacles[o].motion.to();
+      return geometry::sweep(obstacles[o].shape, pose.body(x[i]), pose.body(x[j]), 0).has_value();
+    });
+  };
+  std::vector<std::vector<Index>> hidden(near_.size());  // of those with higher numbers
+  parallel_for(near_.size(), [&](std::size_t q) {
+    for (const Index j : neighbors[near_[q]])
+      if (j > near_[q] && on_two_sides(near_[q], j) && stand_between(near_[q], j)) hidden[q].push_back(j);
+  }, 64);
+  // Who is hidden from whom, both ways, sorted.
+  std::vector<std::uint64_t> pairs;
+  const auto key = [](Index i, Index j) { return (static_cast<std::uint64_t>(i) << 32) | j; };
+  for (std::size_t q = 0; q < near_.size(); ++q)
+    for (const Index j : hidden[q]) {
+      pairs.push_back(key(near_[q], j));
+      pairs.push_back(key(j, near_[q]));
+    }
+  if (pairs.empty()) return;
+  std::sort(pairs.begin(), pairs.end());
+  std::vector<Index> which;
+  for (const std::uint64_t pair : pairs)
+    if (const auto i = static_cast<Index>(pair >> 32); which.empty() || which.back() != i) which.push_back(i);
+  neighbors.drop(which, [&](std::size_t k, Index j) { return std::binary_search(pairs.begin(), pairs.end(), key(which[k], j)); });
+  COUNT("sph.parted pairs", pairs.size() / 2);
 }
 
 bool Solids::disturbs(const Vec3& x, Real reach, Real speed) const {

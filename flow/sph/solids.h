@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "flow/sph/boundary.h"
+#include "flow/sph/column_grid.h"
 #include "flow/sph/movable.h"
 #include "geometry/collide/obstacles.h"
 #include "geometry/collide/slide.h"
@@ -78,6 +79,9 @@ class Solids {
 
   /// Appends to each particle's walls those of obstacles within reach [m]. x: the particles', as walls has them.
   void add_walls(std::span<const Vec3> x, Real reach, Walls& walls);
+  /// Takes pairs of particles that obstacles stand between out of the lists: lava on the two sides of a thin plate knows nothing of each
+  /// other. For the walls last added to, of the same x; not where the flow is periodic (images' walls are not known).
+  void part(std::span<const Vec3> x, const Walls& walls, Neighbors& neighbors);
   /// The fastest surface among the walls last added [m/s].
   Real speed() const { return speed_; }
   /// Whether a surface that goes faster than `speed` [m/s] is within reach of x.

@@ -47,7 +47,7 @@ struct Bath {
     o.rheology = sph::Rheology::newtonian(1e6);
     o.rest_period = 0;
     o.ground_speed = 0;
-    o.max_step = 500;
+    o.max_step = 4000;
     o.heat.viscous_heating = false;
     o.heat.curve.latent_heat = 0;
     o.heat.air.emissivity = o.heat.air.convection = 0;
@@ -62,8 +62,8 @@ TEST(SolidHeat, WhatLavaLosesTheCubeHasUntilBothAreAsWarm) {
   const Real lava_capacity = bath.lava.particle_mass() * static_cast<Real>(bath.lava.size()) * bath.lava.options().heat.curve.heat_capacity;
   const Real end = (lava_capacity * kHot + capacity * kCold) / (lava_capacity + capacity);
   Real mean = kCold;
-  while (bath.lava.time() < 4e5) {
-    bath.lava.step(2000);
+  while (bath.lava.time() < 3e5) {
+    bath.lava.step(4000);
     const SolidWorld::Warmth& warmth = bath.world.warmth()[0];
     EXPECT_NEAR(before - bath.lava.heat().total_enthalpy(), warmth.given, 1e-9 * before);
     EXPECT_NEAR(warmth.mean, kCold + warmth.given / capacity, 1e-9 * kHot);

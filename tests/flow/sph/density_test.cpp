@@ -70,7 +70,7 @@ TEST_P(FilmShape, GivesItsWallsTheFrictionOfItsDepth) {
   }
 }
 
-// Lava above that has no wall in reach sees the surface for them.
+// On an obstacle lava above that has no wall in reach sees the surface for them.
 TEST(FilmShapeOfMiddlingDepth, TellsTheDepthToThoseWhoSeeNoSurface) {
   for (const int layers : {5, 6}) {
     SampleSystem s = film(layers, 0, 3);

@@ -115,6 +115,34 @@ TEST(Solids, NoneGoesThroughAWallOfNoThickness) {
   EXPECT_GT(met, 50u) << "it never came there";
 }
 
+// Lava on the two sides of a sheet: what is deep on one side leaves that on the other as it would be alone.
+TEST(Solids, LavaOnTheTwoSidesOfASheetKnowsNothingOfEachOther) {
+  const Real dx = 0.5;
+  const auto pool = [&](bool both) {
+    Obstacles obstacles;
+    obstacles.add({CollisionMesh(tray(Vec3::Zero(), Vec3(12 * dx, 6 * dx, 12 * dx))), {}, 0, 1});
+    obstacles.add({CollisionMesh(plate(Vec3(0, 20, 0), Vec3(0, 0, 20))), RigidMotion(RigidPose{Vec3(6 * dx, 0, 0), Quat::Identity()}), 0, 2});
+    obstacles.update();
+    ModernOptions o = thick(dx, 26000);
+    o.viscosity_tolerance = 1e-8;
+    o.divergence_tolerance = 1e-8;
+    ModernLava lava(o, {}, {ground_at(-100)}, {}, {&obstacles, {}, {}});
+    std::vector<Vec3> x = lattice_block(6, 6, 3, dx);
+    if (both)
+      for (const Vec3& p : lattice_block(6, 6, 8, dx)) x.push_back(p + Vec3(6 * dx, 0, 0));
+    fill(lava, x);
+    while (lava.time() < 0.5) lava.step(0.05);
+    std::vector<Vec3> left(108);
+    for (std::size_t i = 0; i < lava.size(); ++i)
+      if (lava.ids()[i] < left.size()) left[lava.ids()[i]] = lava.positions()[i];
+    return left;
+  };
+  const std::vector<Vec3> alone = pool(false), beside = pool(true);
+  Real most = 0;
+  for (std::size_t i = 0; i < alone.size(); ++i) most = std::max(most, (alone[i] - beside[i]).norm());
+  EXPECT_LT(most, 0.01 * dx);
+}
+
 // A piston drives lava along a channel; what it drives stays before it, and no faster step is taken than its speed allows.
 TEST(Solids, APistonPushesLavaAhead) {
   const Real dx = 0.5, speed = 2;
