@@ -40,7 +40,7 @@ bool is_long(const Case& c) { return c.name.starts_with("work-") || c.name == "c
 
 /// Figures that miss their bar, and the error they have now. The page calls them missed; here they may get better, and not worse by more
 /// than a quarter. A lattice cut by a cylinder leaves its rim 1.1 spacings from the nearest particle. Anisotropic kernels show the steps of a
-/// lattice on a torus, and draw the surface in by an eighth of a spacing at a slab's corners.
+/// lattice on round bodies, and lose a slab's corners to the mean of their layers.
 struct Shortfall {
   std::string_view name, method;
   double error;
@@ -48,7 +48,8 @@ struct Shortfall {
 };
 /// Of the relief's height: a lattice that does not move with the lava cuts its corners elsewhere in each frame.
 constexpr std::string_view kMadeAnew = "mean error of a skin made anew";
-constexpr Shortfall kShort[] = {{"cylinder", "level set, lattice", 0.584}, {"slab", "anisotropic, disorder", 0.622}, {"sphere", "anisotropic, lattice", 0.516}, {"torus", "anisotropic, lattice", 0.582},
+constexpr Shortfall kShort[] = {{"cylinder", "level set, lattice", 0.584}, {"slab", "anisotropic, disorder", 0.564}, {"torus", "anisotropic, lattice", 0.598},
+                                {"sphere", "anisotropic, lattice", 0.523},
                                 {"coherence", "aa", 0.0453, kMadeAnew}, {"coherence", "pahoehoe", 0.0221, kMadeAnew},
                                 {"coherence", "block", 0.0348, kMadeAnew}, {"coherence", "obsidian", 0.0171, kMadeAnew}};
 
