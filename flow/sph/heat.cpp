@@ -15,7 +15,6 @@ namespace effuse::flow::sph {
 
 namespace {
 constexpr std::string_view kModel = "heat 2";  // of a checkpoint: changes with what is saved
-constexpr int kLast = kColumnCells - 1;
 constexpr Real kFinestShare = 1.0 / 200;       // of a column's depth: its first cell
 constexpr Real kFinestCell = 2e-3;             // [m], at most
 constexpr Real kColumnStep = 0.1;              // of a column's age: its implicit step, the flux then errs by 1 %
@@ -82,7 +81,7 @@ Real at(std::span<const Real> values, std::size_t i) { return values.empty() ? 0
 
 Heat::Heat(const HeatOptions& options, Real spacing, Real density)
     : options_(options), spacing_(spacing), density_(density), mass_(density * spacing * spacing * spacing), interval_(0), diffusion_time_(0),
-      shape_(std::min(kFinestShare, kFinestCell / spacing)) {
+      shape_(std::min(kFinestShare, kFinestCell / spacing), options.crust_cells) {
   CHECK_GT(spacing, 0.0);
   CHECK_GT(density, 0.0);
   CHECK_GT(options.conductivity, 0.0);
@@ -248,7 +247,7 @@ void Heat::drop_columns() {
 
 void Heat::load_nodes() {
   node_.resize(size());
-  parallel_for(size(), [&](std::size_t i) { node_[i] = column_of_[i] == kNone ? enthalpy_[i] : columns_[column_of_[i]].H[kLast]; }, 4096);
+  parallel_for(size(), [&](std::size_t i) { node_[i] = column_of_[i] == kNone ? enthalpy_[i] : columns_[column_of_[i]].H[last_cell()]; }, 4096);
 }
 
 void Heat::store_nodes() {
@@ -258,8 +257,8 @@ void Heat::store_nodes() {
       enthalpy_[i] = node_[i];
       return;
     }
-    enthalpy_[i] += (node_[i] - columns_[c].H[kLast]) * shape_.share[kLast];
-    columns_[c].H[kLast] = node_[i];
+    enthalpy_[i] += (node_[i] - columns_[c].H[last_cell()]) * shape_.share[last_cell()];
+    columns_[c].H[last_cell()] = node_[i];
   }, 4096);
 }
 
@@ -296,7 +295,7 @@ Real Heat::exchange(const Surroundings& s, const Kernel& W) {
     packed_[i] = {s.x[i].x(), s.x[i].y(), s.x[i].z(), options_.curve.temperature(node_[i]), conductivity(node_[i]), column_of_[i] == kNone ? 0.0 : 1.0};
   }, 4096);
 
-  const Real alpha = column_factor(W, spacing_, shape_.share[kLast]);
+  const Real alpha = column_factor(W, spacing_, shape_.share[last_cell()]);
   const Real volume = mass_ / density_, scale = volume * volume / mass_;
   const Vec2 L = s.period;
   const auto nearest = [](Real d, Real period) { return d > period / 2 ? d - period : d < -period / 2 ? d + period : d; };
@@ -321,7 +320,7 @@ Real Heat::exchange(const Surroundings& s, const Kernel& W) {
         conductance += w;
       }
       // The last cell of a column takes it all.
-      const Real per_mass = scale / (p.column > 0 ? shape_.share[kLast] : 1);
+      const Real per_mass = scale / (p.column > 0 ? shape_.share[last_cell()] : 1);
       gain_[i] = per_mass * gain;
       rate_[i] = per_mass * conductance / options_.curve.heat_capacity;
     });
@@ -378,7 +377,7 @@ HeatBudget Heat::lose_column(std::size_t c, Real dt, const Surroundings& s, bool
   const bool turned = (sky > 0) == (column.buried > 0);
   column.buried = sky > 0 ? 0 : column.buried + dt;
   const Real area = at(s.ground_area, i);
-  column.pending_ground += dt * ground_conductance(i, dt, area, shape_.share[kLast] * column.depth, column.H[kLast], at(s.ground_temperature, i), at(s.ground_effusivity, i));
+  column.pending_ground += dt * ground_conductance(i, dt, area, shape_.share[last_cell()] * column.depth, column.H[last_cell()], at(s.ground_temperature, i), at(s.ground_effusivity, i));
   if (area > 0) column.ground_temperature = s.ground_temperature[i];
 
   const Real k = std::max(options_.conductivity, options_.solid_conductivity);
@@ -407,7 +406,7 @@ HeatBudget Heat::lose_column(std::size_t c, Real dt, const Surroundings& s, bool
   given_[i] += budget.ground;
   column.pending = column.pending_sky = column.pending_ground = 0;
   Real mean = 0;
-  for (int j = 0; j < kColumnCells; ++j) mean += shape_.share[j] * column.H[j];
+  for (int j = 0; j < shape_.cells; ++j) mean += shape_.share[j] * column.H[j];
   enthalpy_[i] = mean;
   refresh_particle(i);
   return budget;
@@ -479,7 +478,7 @@ void Heat::refresh_particle(std::size_t i) {
   }
   const CrustColumn& column = columns_[c];
   Real solid = 0;
-  for (int j = 0; j < kColumnCells; ++j) solid += shape_.share[j] * curve.solid_fraction(column.H[j]);
+  for (int j = 0; j < shape_.cells; ++j) solid += shape_.share[j] * curve.solid_fraction(column.H[j]);
   solid_fraction_[i] = solid;
   surface_temperature_[i] = column.buried > 0 ? temperature_[i] : column.surface_temperature;
   const Real depth = crust_depth(column, shape_, curve, options_.crust_temperature);
@@ -497,7 +496,7 @@ std::vector<Heat::Level> Heat::profile(std::size_t i) const {
   if (column_of_[i] == kNone) return levels;
   const CrustColumn& column = columns_[column_of_[i]];
   levels.push_back({0, column.surface_temperature});
-  for (int j = 0; j < kColumnCells; ++j) levels.push_back({shape_.centre[j] * column.depth, options_.curve.temperature(column.H[j])});
+  for (int j = 0; j < shape_.cells; ++j) levels.push_back({shape_.centre[j] * column.depth, options_.curve.temperature(column.H[j])});
   return levels;
 }
 

@@ -23,6 +23,7 @@ struct HeatOptions {
   Real ground_conductance = 0;    ///< [W/(m^2 K)] instead of a half-space: a plate with its far side at the ground temperature. 0: half-space
   bool viscous_heating = true;    ///< use Surroundings::dissipation
   bool crust = true;              ///< a conductive column on each exposed particle; false: it glows with its mean temperature
+  int crust_cells = kColumnCells; ///< of that column, 2 to 16
   Real crust_temperature = 1070 + kZeroCelsius;  ///< crust is what is colder [K]
   Real longest_interval = 60;     ///< [s] between two exchanges among particles, see Heat::conducts()
 };
@@ -44,7 +45,7 @@ struct HeatBudget {
 /// properties (Meyer, Balsara & Aslam 2014, J. Comput. Phys. 257, 594-626). Exchange and losses take turns, of 0.05
 /// dx^2/kappa each, though not more than eight in a step unless the stages would grow beyond 51.
 ///
-/// An exposed particle (sky_area > 0) holds, in place of its one value, a CrustColumn: 16 cells from the surface to the
+/// An exposed particle (sky_area > 0) holds, in place of its one value, a CrustColumn: crust_cells cells from the surface to the
 /// particle's depth, whose sum IS its enthalpy. Losses leave by the first cell, implicitly in the surface temperature;
 /// neighbours exchange with the last one, which stands nearer to them than a particle's centre. Such pairs (one has a
 /// column, the other not) take their weight at 1.5 times their distance, so that the first layer below dominates, and
@@ -156,6 +157,7 @@ class Heat {
   void refresh();
   void refresh_particle(std::size_t i);
   Real conductivity(Real enthalpy) const;
+  std::size_t last_cell() const { return static_cast<std::size_t>(shape_.cells - 1); }
 
   HeatOptions options_;
   Real spacing_, density_, mass_, interval_, diffusion_time_;

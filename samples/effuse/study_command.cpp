@@ -25,6 +25,8 @@ std::vector<Study> studies() {
           {"skin", "the skin of solids filled with particles beside the solids, its relief and colour; --full makes a sheet of close-ups", &study::skin_cases},
           {"integrators", "what a scheme and its step cost for the error they make, and where they blow up", &study::integrator_cases},
           {"lava", "what the lava's spacing, support, step, tolerances and stiffness cost for the error they make", &study::lava_cases},
+          {"heat", "what the crust's cells cost, and what they buy", &study::heat_cases},
+          {"terrain", "what triangles of the ground cost, and where the lava goes on fewer", &study::terrain_cases},
           {"solvers", "waves, rigid bodies, elastic solids: what grid, step and elements cost", &study::solver_cases}};
 }
 

@@ -92,7 +92,7 @@ TEST(Cost, ResultsReadBackBitForBit) {
 
 std::vector<Case> all_cases() {
   std::vector<Case> all;
-  for (const auto& cases : {integrator_cases(), lava_cases(), solver_cases()}) all.insert(all.end(), cases.begin(), cases.end());
+  for (const auto& cases : {integrator_cases(), lava_cases(), heat_cases(), terrain_cases(), solver_cases()}) all.insert(all.end(), cases.begin(), cases.end());
   return all;
 }
 
