@@ -73,11 +73,13 @@ ColumnShape::ColumnShape(Real finest, int count) : cells(count) {
 
 namespace {
 
+/// kFixed: the number of cells, where the compiler may know it (an eighth less time); 0: cells.
 /// The equations of one step, in joules per square metre:  R_j = mass_j (H_j - start_j) + dt (what conduction takes from T_j) = 0.
 /// R is the slope of a convex function of T, for H(T) rises: the sum of mass int H dT, of the conductances' squares, and
 /// of int flux dT at the face.
+template <int kFixed>
 struct StepEquations {
-  int n;  // cells
+  int cells;
   const EnthalpyCurve& curve;
   const SurfaceLaw& air;
   const ColumnEnds& ends;
@@ -94,12 +96,14 @@ struct StepEquations {
     return ends.sky_share > 0 ? dt * top * slope / (top + slope) : 0;
   }
   void residual(const Cells& H, const Cells& T, Real sky, Cells& R) const {
+    const int n = kFixed > 0 ? kFixed : cells;
     for (int j = 0; j < n; ++j)
       R[j] = mass[j] * (H[j] - start[j]) + (j > 0 ? G[j] * (T[j] - T[j - 1]) : sky) +
              (j + 1 < n ? G[j + 1] * (T[j] - T[j + 1]) : bottom * (T[j] - ends.ground_temperature));
   }
   /// Newton's step d [K] from R and the slopes dH/dT: a symmetric tridiagonal system.
   void newton_step(const Cells& R, const Cells& slope, Real sky_slope, Cells& d) const {
+    const int n = kFixed > 0 ? kFixed : cells;
     Cells diagonal;
     for (int j = 0; j < n; ++j) {
       diagonal[j] = mass[j] * slope[j] + (j > 0 ? G[j] : sky_slope) + (j + 1 < n ? G[j + 1] : bottom);
@@ -115,13 +119,12 @@ struct StepEquations {
   }
 };
 
-}  // namespace
-
-ColumnLoss step_column(Cells& H, Real dt, Real depth, Real density, const ColumnShape& shape, const EnthalpyCurve& curve, Real k_melt, Real k_solid,
+template <int kFixed>
+ColumnLoss step_cells(Cells& H, Real dt, Real depth, Real density, const ColumnShape& shape, const EnthalpyCurve& curve, Real k_melt, Real k_solid,
                        const SurfaceLaw& air, const ColumnEnds& ends, Real& surface_temperature) {
   DCHECK(curve.liquidus > curve.solidus);
-  const int n = shape.cells;
-  StepEquations step{n, curve, air, ends, dt, {}, H, {}, 0, dt * ends.ground_conductance};
+  const int n = kFixed > 0 ? kFixed : shape.cells;
+  StepEquations<kFixed> step{n, curve, air, ends, dt, {}, H, {}, 0, dt * ends.ground_conductance};
   Cells half{};
   for (int j = 0; j < n; ++j) {
     const Real k = k_melt + (k_solid - k_melt) * curve.solid_fraction(H[j]);
@@ -160,7 +163,7 @@ ColumnLoss step_column(Cells& H, Real dt, Real depth, Real density, const Column
       H = step.start;
       ColumnLoss loss;
       for (int part = 0; part < 2; ++part) {
-        const ColumnLoss more = step_column(H, dt / 2, depth, density, shape, curve, k_melt, k_solid, air, ends, surface_temperature);
+        const ColumnLoss more = step_cells<kFixed>(H, dt / 2, depth, density, shape, curve, k_melt, k_solid, air, ends, surface_temperature);
         loss.radiated += more.radiated;
         loss.convected += more.convected;
         loss.ground += more.ground;
@@ -217,6 +220,14 @@ ColumnLoss step_column(Cells& H, Real dt, Real depth, Real density, const Column
   loss.radiated = sum != 0 ? left * (radiated / sum) : left;
   loss.convected = left - loss.radiated;
   return loss;
+}
+
+}  // namespace
+
+ColumnLoss step_column(Cells& H, Real dt, Real depth, Real density, const ColumnShape& shape, const EnthalpyCurve& curve, Real k_melt, Real k_solid,
+                       const SurfaceLaw& air, const ColumnEnds& ends, Real& surface_temperature) {
+  const auto step = shape.cells == N ? step_cells<N> : step_cells<0>;
+  return step(H, dt, depth, density, shape, curve, k_melt, k_solid, air, ends, surface_temperature);
 }
 
 Real crust_depth(const CrustColumn& column, const ColumnShape& shape, const EnthalpyCurve& curve, Real isotherm) {
