@@ -178,7 +178,7 @@ HeatBudget Heat::step(Real dt, const Surroundings& s) {
     CHECK_GT(s.support, 0.0);
     // The longest monotone step is kMonotone / rate; s stages are as good as (s^2 + s) / 2 of those.
     load_nodes();
-    const Real wanted = pair_time_ * exchange(s) / kMonotone;
+    const Real rate = exchange(s), wanted = options_.guards.monotone_conduction ? pair_time_ * rate / kMonotone : 0;
     // Surfaces and pairs take turns: in a long step, more often.
     const Real turns = std::min(kMostTurns, pair_time_ / (kTurn * diffusion_time_));
     const Real super_steps = std::max(1.0, std::ceil(std::max(turns, wanted / (kMostStages * (kMostStages + 1) / 2))));

@@ -6,6 +6,7 @@
 #include "flow/sph/column_grid.h"
 #include "flow/sph/crust_column.h"
 #include "flow/sph/enthalpy.h"
+#include "flow/sph/guards.h"
 #include "flow/sph/kernel.h"
 #include "geometry/base/hash.h"
 #include "geometry/base/state_io.h"
@@ -26,6 +27,7 @@ struct HeatOptions {
   int crust_cells = kColumnCells; ///< of that column, 2 to 16
   Real crust_temperature = 1070 + kZeroCelsius;  ///< crust is what is colder [K]
   Real longest_interval = 60;     ///< [s] between two exchanges among particles, see Heat::conducts()
+  Guards guards;             ///< all on, but for tests
 };
 
 /// Joules, of one step. Enthalpy gained = dissipated - radiated - convected - ground, to rounding.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "flow/sph/ground.h"
+#include "flow/sph/guards.h"
 #include "flow/sph/heat.h"
 #include "flow/sph/kernel.h"
 #include "flow/sph/rheology.h"
@@ -48,6 +49,7 @@ struct ModernOptions {
   Vec2 period = Vec2::Zero();  ///< of x and y [m], positions in [0, period); 0: not periodic. At least two supports.
   Real rest_period = 60;     ///< [s] between two births of one set of material coordinates; 0: never
   std::uint64_t seed = 1;
+  Guards guards;             ///< all on, but for tests
 };
 
 /// What one step did.
