@@ -306,6 +306,27 @@ TEST_F(ImportCommandTest, AMeshIsCroppedOnTheMapAndRemeshed) {
   EXPECT_NE(refused(c).find("nothing of it is in the crop: it lies from 2667405"), std::string::npos) << refused(c);
 }
 
+TEST_F(ImportCommandTest, FilesAreReadWithinLimitsThatCanBeRaised) {
+  for (const fs::path& file : {kWhau, fs::path(EFFUSE_SOURCE_DIR) / "samples" / "scenes" / "house.obj"}) {
+    CommonOptions common;
+    common.quiet = true;
+    common.read_limit = "0.0001s";
+    const ImportCommand c = command(file, "out.ply");
+    try {
+      import_terrain_file(c, common);
+      ADD_FAILURE() << file;
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find("is not read after 0.0001 s"), std::string::npos) << error.what();
+    }
+    EXPECT_FALSE(fs::exists(c.output));
+    common.read_limit = "60s,2GB";
+    EXPECT_EQ(import_terrain_file(c, common), ExitCode::kDone);
+    common.read_limit = "60";
+    EXPECT_THROW(import_terrain_file(c, common), InputError);
+    fs::remove(c.output);
+  }
+}
+
 TEST_F(ImportCommandTest, OptionsThatDoNotFitAreRefusedAndNothingIsWritten) {
   write_file(folder_ / "cliff.obj", overhang_obj());
   const auto with = [&](auto&& change) {
