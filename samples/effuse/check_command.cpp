@@ -62,7 +62,7 @@ std::string told(const SolidThings& solids) {
 }  // namespace
 
 ExitCode check(const CheckCommand& command, const CommonOptions& common) {
-  const std::unique_ptr<LoadedScene> loaded = load_scene(command.scene, command.set, 0);
+  const std::unique_ptr<LoadedScene> loaded = load_scene(command.scene, command.set, 0, read_limits(common));
   const flow::Scene& scene = loaded->scene;
   flow::Estimate sum;
   std::string simulated, left_out;

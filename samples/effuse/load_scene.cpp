@@ -44,7 +44,12 @@ std::string state_key(const flow::Node& resolved, const geometry::Terrain& terra
 }
 }  // namespace
 
-std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const std::vector<std::string>& overrides, int frames) {
+importers::ReadLimits read_limits(const CommonOptions& common) {
+  const importers::ReadLimits apart{true, 0, 0};
+  return common.read_limit.empty() ? apart : importers::parse_read_limits(common.read_limit, apart);
+}
+
+std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const std::vector<std::string>& overrides, int frames, const importers::ReadLimits& limits) {
   ZONE("load");
   flow::Node node = file.extension() == ".w" ? importers::jello_scene(importers::read_jello_world(file), file) : importers::read_scene_file(file);
   for (const std::string& assignment : overrides) importers::apply_override(node, assignment);
@@ -66,7 +71,7 @@ std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const
   if (!scene.terrain.files.empty()) {
     try {
       for (const std::string& name : scene.terrain.files) terrain_paths.push_back(std::filesystem::path(name).is_relative() ? file.parent_path() / name : std::filesystem::path(name));
-      importers::TerrainImport import = importers::import_terrain(terrain_paths, terrain_options(scene.terrain));
+      importers::TerrainImport import = importers::import_terrain(terrain_paths, terrain_options(scene.terrain, limits));
       loaded->terrain = std::move(import.terrain);
       loaded->notes = std::move(import.notes);
     } catch (const InputError& error) {
@@ -79,15 +84,15 @@ std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const
     loaded->notes.push_back(fmt::format("plane of {:g} x {:g} m, slope {:.3g} deg", plane->size.x(), plane->size.y(), plane->slope * 180 / kPi));
   }
   if (loaded->terrain) {
-    loaded->solids.obstacles = load_obstacles(scene, file.parent_path(), *loaded->terrain, faults, loaded->notes);
-    loaded->solids.bodies = load_bodies(scene, file.parent_path(), *loaded->terrain, faults, loaded->notes);
+    loaded->solids.obstacles = load_obstacles(scene, {file.parent_path(), limits}, *loaded->terrain, faults, loaded->notes);
+    loaded->solids.bodies = load_bodies(scene, {file.parent_path(), limits}, *loaded->terrain, faults, loaded->notes);
     SolidThings& solids = loaded->solids;
     if (solids.obstacles.size() == scene.obstacles.size() && solids.bodies.size() == scene.bodies.size())
       solids.joints = load_joints(scene, solids.obstacles, solids.bodies, *loaded->terrain, faults, loaded->notes);
   }
   const auto world = [&] {
     return flow::World{&*loaded->terrain, scene.seed, &loaded->solids.obstacles, &loaded->solids.bodies, &loaded->solids.joints, scene.body_settings,
-                       [&](const flow::PlannedForm& form) { return load_form(form, file.parent_path()); }};
+                       [&](const flow::PlannedForm& form) { return load_form(form, {file.parent_path(), limits}, loaded->notes); }};
   };
   if (!faults.empty() && loaded->terrain) {
     for (const flow::EffectPlan& plan : scene.effects)

@@ -18,8 +18,10 @@
 #include "importers/input_file.h"
 #include "importers/points/import_points.h"
 #include "importers/points/spacing.h"
+#include "importers/terrain/import_dem.h"
 #include "importers/terrain/import_terrain.h"
 #include "samples/effuse/commands.h"
+#include "samples/effuse/load_scene.h"
 #include "samples/effuse/first_positions.h"
 #include "skin/color/lava_color.h"
 #include "skin/surface/level_set.h"
@@ -425,6 +427,17 @@ std::string to_text(const Check& check) {
                      check.self_intersections == 0 ? "no self-intersections" : fmt::format("{} pairs of triangles intersect", check.self_intersections), check.volume);
 }
 
+/// Ground in the file's own coordinates, which are to be the particles': the terrain.ply of a run lies where its particles are, not on
+/// the map.
+importers::TerrainImport import_ground(const fs::path& file, const CommonOptions& common) {
+  importers::TerrainImportOptions options;
+  options.mesh.limits = options.dem.limits = read_limits(common);
+  if (importers::is_dem(file)) return importers::import_terrain(file, options);
+  importers::MeshImport mesh = importers::import_mesh(file, options.mesh);
+  mesh.frame.origin = Vec3::Zero();
+  return importers::terrain_from_mesh(std::move(mesh), file.string(), options);
+}
+
 class Skinner {
  public:
   Skinner(const SkinCommand& command, const CommonOptions& common) : command_(command), common_(common) {
@@ -436,7 +449,7 @@ class Skinner {
     temperature_ = told_temperature(command);
     if (command.particle_radius > 0) radius_ = Radius{command.particle_radius, "--particle-radius"};
     if (!command.terrain.empty()) {
-      const importers::TerrainImport import = importers::import_terrain(command.terrain);
+      const importers::TerrainImport import = import_ground(command.terrain, common);
       for (const std::string& note : import.notes) tell_once(command.terrain, note);
       terrain_ = counted_from(import.terrain, origin_);
     }

@@ -7,6 +7,7 @@
 #include "geometry/base/check.h"
 #include "geometry/base/error.h"
 #include "geometry/procedural/primitives.h"
+#include "geometry/repair/repair.h"
 #include "importers/mesh/import_mesh.h"
 #include "samples/effuse/solid_look.h"
 
@@ -20,11 +21,20 @@ bool has_form(const flow::PlannedForm& form) { return !form.file.empty() || form
 
 }  // namespace
 
-geometry::TriMesh load_form(const flow::PlannedForm& form, const std::filesystem::path& folder) {
+geometry::TriMesh load_form(const flow::PlannedForm& form, const SceneFiles& files, std::vector<std::string>& notes) {
   if (form.file.empty()) return flow::mesh_of(form);
-  const std::filesystem::path path = std::filesystem::path(form.file).is_relative() ? folder / form.file : std::filesystem::path(form.file);
+  const std::filesystem::path path = std::filesystem::path(form.file).is_relative() ? files.folder / form.file : std::filesystem::path(form.file);
   try {
-    return importers::import_mesh(path).mesh;
+    importers::MeshOptions options;
+    options.limits = files.limits;
+    geometry::TriMesh mesh = importers::import_mesh(path, options).mesh;
+    const geometry::RepairReport repairs = geometry::repair(mesh);
+    std::string told;
+    for (const std::string& line : geometry::to_lines(repairs)) told += (told.empty() ? "" : "; ") + line;
+    if (repairs.inward_shells > 0) told += fmt::format("{}{} inside, facing inward: room", told.empty() ? "" : "; ", repairs.inward_shells == 1 ? "a part" : "parts");
+    if (!told.empty()) notes.push_back(fmt::format("'{}': {}", form.name, told));
+    if (mesh.triangles.empty()) throw InputError({path.string()}, "holds no triangle with an area");
+    return mesh;
   } catch (const InputError& error) {
     std::vector<Fault> faults;
     for (const Fault& fault : error.faults()) faults.push_back({form.file_place, to_string(fault)});
@@ -32,14 +42,14 @@ geometry::TriMesh load_form(const flow::PlannedForm& form, const std::filesystem
   }
 }
 
-std::vector<flow::PlacedObstacle> load_obstacles(const flow::Scene& scene, const std::filesystem::path& folder, const geometry::Terrain& terrain, std::vector<Fault>& faults,
+std::vector<flow::PlacedObstacle> load_obstacles(const flow::Scene& scene, const SceneFiles& files, const geometry::Terrain& terrain, std::vector<Fault>& faults,
                                                  std::vector<std::string>& notes) {
   std::vector<flow::PlacedObstacle> placed;
   for (const flow::PlannedObstacle& plan : scene.obstacles) {
     if (!has_form(plan)) continue;
     try {
       const std::size_t before = placed.size();
-      flow::place_obstacle(plan, load_form(plan, folder), terrain, placed, faults);
+      flow::place_obstacle(plan, load_form(plan, files, notes), terrain, placed, faults);
       if (placed.size() > before) notes.push_back(fmt::format("obstacle '{}': {}", plan.name, geometry::to_string(placed.back().shape.report())));
     } catch (const InputError& error) {
       faults.insert(faults.end(), error.faults().begin(), error.faults().end());
@@ -48,7 +58,7 @@ std::vector<flow::PlacedObstacle> load_obstacles(const flow::Scene& scene, const
   return placed;
 }
 
-std::vector<flow::PlacedBody> load_bodies(const flow::Scene& scene, const std::filesystem::path& folder, const geometry::Terrain& terrain, std::vector<Fault>& faults,
+std::vector<flow::PlacedBody> load_bodies(const flow::Scene& scene, const SceneFiles& files, const geometry::Terrain& terrain, std::vector<Fault>& faults,
                                           std::vector<std::string>& notes) {
   std::vector<flow::PlacedBody> placed;
   std::string first;  // of those that are alike, by name
@@ -57,7 +67,7 @@ std::vector<flow::PlacedBody> load_bodies(const flow::Scene& scene, const std::f
     if (!has_form(plan)) continue;
     try {
       const std::size_t before = placed.size();
-      flow::place_body(plan, load_form(plan, folder), terrain, placed, faults);
+      flow::place_body(plan, load_form(plan, files, notes), terrain, placed, faults);
       if (placed.size() == before) continue;
       const std::string what = fmt::format("{:.4g} m3, {:.4g} kg{}", placed.back().volume, placed.back().volume * plan.density,
                                            placed.back().cells ? fmt::format(", {} cells, breaks at {:.4g} Pa", placed.back().cells->cells.size(), placed.back().strength) : "");

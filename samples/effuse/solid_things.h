@@ -9,20 +9,28 @@
 #include "flow/scene/rigid_bodies.h"
 #include "flow/scene/scene.h"
 #include "geometry/mesh/tri_mesh.h"
+#include "importers/read_apart.h"
 #include "skin/scene/skin_settings.h"
 
 namespace effuse {
 
-/// The mesh that a form names, its file's relative to the scene's folder, or its box or ball. Throws InputError at the scene's line.
-geometry::TriMesh load_form(const flow::PlannedForm& form, const std::filesystem::path& folder);
+/// Where a scene's files lie, and what reading one may cost.
+struct SceneFiles {
+  std::filesystem::path folder;
+  importers::ReadLimits limits;
+};
+
+/// The mesh that a form names, its file's relative to the scene's folder and repaired (geometry/repair), or its box or ball. Throws
+/// InputError at the scene's line. notes: what was repaired.
+geometry::TriMesh load_form(const flow::PlannedForm& form, const SceneFiles& files, std::vector<std::string>& notes);
 
 /// Reads the meshes of a scene's obstacles, relative to its folder, and puts them on the terrain. What goes wrong is a fault at the
 /// line that names the file. notes: what was done to meshes on the way, a line each.
-std::vector<flow::PlacedObstacle> load_obstacles(const flow::Scene& scene, const std::filesystem::path& folder, const geometry::Terrain& terrain, std::vector<Fault>& faults,
+std::vector<flow::PlacedObstacle> load_obstacles(const flow::Scene& scene, const SceneFiles& files, const geometry::Terrain& terrain, std::vector<Fault>& faults,
                                                  std::vector<std::string>& notes);
 
 /// The same for its rigid bodies.
-std::vector<flow::PlacedBody> load_bodies(const flow::Scene& scene, const std::filesystem::path& folder, const geometry::Terrain& terrain, std::vector<Fault>& faults,
+std::vector<flow::PlacedBody> load_bodies(const flow::Scene& scene, const SceneFiles& files, const geometry::Terrain& terrain, std::vector<Fault>& faults,
                                           std::vector<std::string>& notes);
 
 /// Its joints, among obstacles and bodies of which none was left out.
