@@ -287,7 +287,7 @@ LevelSet build_level_set(const geometry::Points& points, Real volume, const geom
             .raster = {.reach = s.reach, .spacing = d, .radius_factor = 2 * static_cast<float>(options.radius), .outside = s.outside},
             .smoothing = static_cast<float>(options.smoothing) * d * d / 24,
             .lone = near_surface * near_surface * near_surface,
-            .cover = {.factor = options.kernel == SurfaceKernel::kRound ? 2 * static_cast<float>(options.cover) : 0, .blend = kCoverBlend * d, .reach = s.reach, .all = kStandsOut * full, .none = kLiesFlat * full}};
+            .cover = {.factor = 2 * static_cast<float>(options.cover), .blend = kCoverBlend * d, .reach = s.reach, .all = kStandsOut * full, .none = kLiesFlat * full}};
   s.rule.sheet = static_cast<float>(kPi) / 4 * (s.reach / d) * (s.reach / d) * s.rule.lone * near_surface;
   Making making;
   making.sink = sink;
