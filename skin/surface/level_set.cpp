@@ -129,6 +129,7 @@ Shift match(LevelSet::Impl& s, const Making& making, const Field& phi, const Fie
   if (!(making.volume > 0)) return shift;
   shift = matching_shift(s.blocks, s.outside, phi, above, making.volume, making.most_shift, known);
   s.report.shift = static_cast<Real>(shift.voxels()) * s.voxel;
+  s.level = shift.exact / kShiftSteps;
   s.outside -= shift.voxels();
   return shift;
 }

@@ -52,6 +52,7 @@ struct LevelSet::Impl {
   Field phi;  ///< the surface is its zero level; about a distance near it
   std::optional<geometry::Terrain> terrain;
   LevelSetReport report;
+  Real level = 0;        ///< the shift [voxels], finer than the field's was: where the particles' own surface lies
   std::uint64_t frame = 0;       ///< of its SurfaceCache; 0: made without one
   std::shared_ptr<ReturnedField> home;  ///< of that cache
   std::vector<Index> unchanged;  ///< of each block with the values of one of the frame before: which; kNone. Empty: none has
@@ -107,9 +108,10 @@ struct KnownVolumes {
 Real enclosed(const Blocks& blocks, float outside, const Field& phi, const Field& above, float shift);
 /// At shift 0, blocks that are known taken from there.
 Real enclosed(const Blocks& blocks, float outside, const Field& phi, const Field& above, KnownVolumes& known);
-inline constexpr int kShiftSteps = 128;
+inline constexpr int kShiftSteps = 64;
 struct Shift {
   int steps = 0;     ///< of 1 / kShiftSteps voxels
+  Real exact = 0;    ///< the same, between two steps where the target is
   Real volume = -1;  ///< [voxels] enclosed by then
   float voxels() const { return static_cast<float>(steps) / kShiftSteps; }
 };

@@ -28,7 +28,7 @@ constexpr float kOverMiddle = 0.25f;              // [spacings]
 constexpr int kMostSteps = 6;                     // two or three serve almost everywhere
 constexpr float kCloseEnough = 5e-4f;             // [spacings]
 constexpr float kMostMoved = 0.5f, kFreely = 0.25f;  // [spacings] points go so far, and up to this all the way
-constexpr float kLeastSlope = 0.3f;               // where the field is flatter it is a crease or a thin sheet
+constexpr float kLeastSlope = 0.3f, kFullSlope = 0.5f;  // where the field is flatter it is a crease, a neck or a thin sheet
 constexpr float kGathered = 0.15f;                // [spacings] particles are looked for anew when a point has gone so far
 constexpr float kSoft = 0.04f;                    // [spacings] how round balls meet one another
 constexpr float kBound = 1.15f, kBoundSlope = 3;  // as in rasterize.cpp
@@ -185,7 +185,7 @@ void ParticleSurface::project(std::span<Vec3> x, std::span<Vec3> normals) const 
   const Stencil stencil(s.rule);
   const float d = s.rule.raster.spacing, margin = kGathered * d, most = kMostMoved * d;
   const Real reach = static_cast<Real>(s.reach + stencil.farthest(s.rule) + margin);
-  const float level = static_cast<float>(s.report.shift / s.voxel);
+  const float level = static_cast<float>(s.level);
   parallel_ranges(x.size(), 64, [&](std::size_t begin, std::size_t end) {
     Near near;
     for (std::size_t i = begin; i < end; ++i) {
@@ -201,11 +201,13 @@ void ParticleSurface::project(std::span<Vec3> x, std::span<Vec3> normals) const 
       const Vector3f first = frame;
       Vector3f normal = frame;
       bool good = true, close = false;
+      float slope = 1;
       for (int step = 0; step < kMostSteps && good && !close; ++step) {
         const Slope now = slope_at(near, s.rule, stencil, at, frame);
         const float length = now.gradient.norm();
         good = length > kLeastSlope && now.gradient.dot(first) > 0.5f * length && now.smooth.dot(first) > kLeastSlope / 2;
         if (!good) break;
+        slope = length;
         normal = now.gradient / length;
         frame = now.smooth.normalized();
         const float way = (now.value - level) / length;
@@ -216,6 +218,7 @@ void ParticleSurface::project(std::span<Vec3> x, std::span<Vec3> normals) const 
       }
       if (!good) continue;
       allowed *= 1 - smoothstep(static_cast<Real>(kFreely * d), static_cast<Real>(most), static_cast<Real>(at.norm()));
+      allowed *= smoothstep(static_cast<Real>(kLeastSlope), static_cast<Real>(kFullSlope), static_cast<Real>(slope));
       x[i] += allowed * s.voxel * at.cast<Real>();
       normals[i] = (normals[i] + allowed * (normal.cast<Real>() - normals[i])).normalized();
     }

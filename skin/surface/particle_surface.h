@@ -15,7 +15,7 @@ namespace effuse::skin {
 ///   phi   Zhu & Bridson's field with its bound (rasterize.h), at any point, from the particles
 ///   phi_s = phi + s (sum_q w_q phi(x + y_q) - phi), y_q in the tangent plane of phi_s at x: a centre and two rings of six and twelve points,
 ///         a Gaussian's moments; what mean-curvature flow for `smoothing` does to a surface that is not far from plane. s: 0 at lone particles .. 1
-///   f     phi_s joined to the balls of particles that stand out (cover), less the shift that the level set had
+///   f     phi_s joined to the balls of particles that stand out (cover), less the shift that the level set had, as it is before it is rounded to steps
 ///
 /// kRound only: for kAnisotropic points stay where they are.
 class ParticleSurface {

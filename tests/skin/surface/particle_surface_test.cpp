@@ -92,7 +92,7 @@ TEST(ParticleSurface, WithoutSmoothingAndBallsIsTheZeroOfZhuAndBridsonsField) {
   const LevelSet surface = build_level_set(slab.points(), slab.volume(), nullptr, options);
   const TriMesh mesh = fine_mesh(surface, true);
   const LevelSet::Impl& s = surface.impl();
-  const auto f = [&](const Vec3& x) { return zhu_bridson(s.particles, s.rule.raster, (x - s.particles.origin()) / s.voxel) * s.voxel - s.report.shift; };
+  const auto f = [&](const Vec3& x) { return zhu_bridson(s.particles, s.rule.raster, (x - s.particles.origin()) / s.voxel) * s.voxel - s.level * s.voxel; };
   std::size_t off = 0;
   Real worst_normal = 1;
   for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
