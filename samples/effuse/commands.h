@@ -82,7 +82,7 @@ struct SkinCommand {
   std::string tessellation = "levelset";         ///< or "voronoi"
   double coarsen = 0;                            ///< in particle spacings, 2 radii; 0: not
   std::string kind = "none";                     ///< smooth, or a name of skin::kSkinKindNames: displaced and coloured
-  std::optional<double> amplitude, edge;         ///< of the displacement, and of the mesh [particle spacings]; absent: the kind's, the cube size
+  std::optional<double> amplitude, edge, oversample;  ///< of the displacement, of the mesh [particle spacings], and edges so many times shorter; absent: the kind's, the cube size, 1
   std::optional<std::uint64_t> seed;
   std::string temperature;                       ///< of particles whose file has none, "1100" [K] or with its unit; empty: cold rock
   std::filesystem::path terrain;                 ///< where the skin ends, in the particles' coordinates; empty: none

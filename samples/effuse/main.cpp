@@ -92,6 +92,7 @@ void add_skin_options(CLI::App* verb, effuse::SkinCommand& skin) {
       ->check(CLI::IsMember({"none", "aa", "pahoehoe", "block", "obsidian", "noise"}));
   verb->add_option("--amplitude", skin.amplitude, "with --kind: half the height of its bumps where cold, in particle spacings (2 radii); 0: colours alone [0.25]")->check(CLI::Range(0.0, 10.0));
   verb->add_option("--edge", skin.edge, "with --kind: the mesh is refined to edges of so many particle spacings, 0.1 say for close-ups [the cube size]")->check(CLI::Range(0.05, 10.0));
+  verb->add_option("--oversample", skin.oversample, "with --kind: edges so many times shorter, with no finer bumps: triangles follow the bumps more closely, and change less from frame to frame; 4 for stills and slow shots [1]")->check(CLI::Range(1.0, 16.0));
   // Beyond what 64 bits hold it would be cut to that in silence.
   const CLI::Validator whole([](std::string& text) { return !text.empty() && text.size() <= 19 && text.find_first_not_of("0123456789") == std::string::npos ? "" : "must be a whole number of up to 19 digits"; }, "");
   verb->add_option("--seed", skin.seed, "with --kind: another one, other bumps [1]")->check(whole);
@@ -115,7 +116,7 @@ void add_skin_options(CLI::App* verb, effuse::SkinCommand& skin) {
   verb->footer("Exit codes: 0 done, 1 a check of the mesh failed, 2 wrong use or bad input, 5 out of disk or memory.");
   // Ranges let nan through.
   const CLI::Validator finite([](std::string& text) { return std::isfinite(std::strtod(text.c_str(), nullptr)) ? "" : "must be a finite number"; }, "");
-  for (const char* name : {"-r", "-l", "-c", "-t", "--drop-volume", "--coarsen", "--amplitude", "--edge", "--particle-aabb-min", "--particle-aabb-max"}) verb->get_option(name)->check(finite);
+  for (const char* name : {"-r", "-l", "-c", "-t", "--drop-volume", "--coarsen", "--amplitude", "--edge", "--oversample", "--particle-aabb-min", "--particle-aabb-max"}) verb->get_option(name)->check(finite);
 }
 
 void add_import_options(CLI::App* verb, effuse::ImportCommand& import) {

@@ -281,8 +281,8 @@ skin::LevelSetOptions level_set_options(const SkinCommand& command, Real radius,
 std::optional<skin::DisplaceOptions> detail_options(const SkinCommand& command) {
   const auto kind = std::find(skin::kSkinKindNames.begin(), skin::kSkinKindNames.end(), command.kind);
   if (kind == skin::kSkinKindNames.end()) {
-    if (command.amplitude || command.edge || command.seed || !command.temperature.empty())
-      throw InputError(Place{}, "--amplitude, --edge, --seed and --temperature go with --kind: the smooth skin has no detail and no colour");
+    if (command.amplitude || command.edge || command.oversample || command.seed || !command.temperature.empty())
+      throw InputError(Place{}, "--amplitude, --edge, --oversample, --seed and --temperature go with --kind: the smooth skin has no detail and no colour");
     return std::nullopt;
   }
   if (std::all_of(command.meshes.begin(), command.meshes.end(), [](const fs::path& file) { return format_of(file) == Format::kVdb; }))
@@ -291,6 +291,7 @@ std::optional<skin::DisplaceOptions> detail_options(const SkinCommand& command) 
   detail.kind = static_cast<skin::SkinKind>(kind - skin::kSkinKindNames.begin());
   detail.amplitude = command.amplitude.value_or(detail.amplitude);
   detail.edge = command.edge.value_or(command.cube_size / 2);
+  detail.oversample = command.oversample.value_or(detail.oversample);
   detail.seed = command.seed.value_or(detail.seed);
   return detail;
 }
