@@ -6,6 +6,7 @@
 #include "geometry/base/check.h"
 #include "geometry/base/error.h"
 #include "geometry/base/parallel.h"
+#include "geometry/base/random.h"
 #include "geometry/base/zones.h"
 #include "geometry/procedural/noise.h"
 
@@ -14,6 +15,7 @@ namespace effuse::flow::particles {
 namespace {
 constexpr std::size_t kGrain = 4096;
 constexpr Real kEddyStrength = 1.6;   // of the noise's curl per unit of amplitude: its deviation is then about the turbulence
+constexpr std::uint64_t kThinning = 20;  // stream of an emitter's seed, of none of its own numbers
 constexpr std::uint64_t kEddySeed[] = {0xed01, 0xed02, 0xed03};
 enum Death : std::uint8_t { kAlive, kAged, kLeft, kFallen };
 
@@ -39,20 +41,24 @@ Real ParticleCloud::temperature(std::size_t i) const {
   return options_.air_temperature + (temperature_[i] - options_.air_temperature) * std::exp(-age(i) / options_.cooling);
 }
 
-void ParticleCloud::step(Real dt, std::span<const Vec3> sources, std::span<const Vec3> source_velocities) {
+void ParticleCloud::step(Real dt, std::span<const Sources> sources) {
   ZONE("particles");
   CHECK_GT(dt, 0);
+  if (!sources.empty()) CHECK_EQ(sources.size(), emitters_.size());
   // Newborns join with their birth's position; their own step is from their birth to the step's end.
   const std::size_t old = size();
   const Real end = time_ + dt;
   for (std::size_t e = 0; e < emitters_.size(); ++e) {
     const std::uint64_t until = emitters_[e].born_by(end);
-    if (emitters_[e].options().shape == EmitterShape::kPoints && sources.empty()) {
+    const bool from_points = emitters_[e].options().shape == EmitterShape::kPoints;
+    const Sources own = from_points && !sources.empty() ? sources[e] : Sources{};
+    if (from_points && own.x.empty()) {
       let_out_[e] = until;
       continue;
     }
     for (std::uint64_t k = let_out_[e]; k < until; ++k) {
-      const Newborn p = emitters_[e].particle(k, sources, source_velocities);
+      if (own.share < 1 && random_uniform(emitters_[e].options().seed, kThinning, k) >= own.share) continue;
+      const Newborn p = emitters_[e].particle(k, own.x, own.v);
       x_.push_back(p.x);
       v_.push_back(p.v);
       born_.push_back(p.born);
