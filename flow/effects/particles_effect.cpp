@@ -248,6 +248,7 @@ class ParticlesEffect final : public Effect {
     cloud.name = settings_.name;
     cloud.look = settings_.look;
     cloud.color = settings_.color;
+    cloud.soft = settings_.soft;
     cloud.points = settings_.points;
     cloud.spheres = settings_.spheres;
     cloud.x.assign(cloud_->positions().begin(), cloud_->positions().end());

@@ -135,8 +135,11 @@ ParticlesSettings read_particles_table(Parameters& p) {
   s.warm_up = p.number("warm_up", "s", 0, {0, 1e4}, "they have been coming for so long as the film begins");
   s.seed = static_cast<std::uint64_t>(p.integer("seed", 0, 0, std::numeric_limits<std::int64_t>::max(), "beside the scene's"));
 
+  // As NamedCloud::Look has them, and flames beside clots.
+  const std::size_t look = p.choice("look", {"grains", "sparks", "puffs", "flames"}, preset.glows ? (preset.volume ? 3 : 1) : preset.volume ? 2 : 0, "in pictures: opaque specks, glowing ones, soft balls that hide what is behind, or whose light adds up");
   using Look = NamedCloud::Look;
-  s.look = static_cast<Look>(p.choice("look", {"grains", "glow", "puffs"}, static_cast<std::size_t>(preset.glows ? Look::kGlow : preset.volume ? Look::kPuffs : Look::kGrains), "in pictures: specks, their own light, soft balls"));
+  s.look = look == 0 ? Look::kGrains : look == 2 ? Look::kPuffs : Look::kGlow;
+  s.soft = look == 3;
   s.color = read_color(p, preset.color);
   s.opacity = p.number("opacity", "", preset.opacity, kShare, "through the middle of one as it is born");
   s.fade_in = p.number("fade_in", "", preset.volume ? 0.1 : 0, kShare, "share of its life in which one appears");

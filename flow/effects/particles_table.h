@@ -36,6 +36,7 @@ struct ParticlesSettings {
   NamedCloud::Look look = NamedCloud::Look::kGrains;
   Vec3 color = Vec3::Ones();  ///< linear light
   Real opacity = 1;
+  bool soft = false;
   Real fade_in = 0, fade_out = 0;  ///< shares of a lifetime
   bool points = true, spheres = false, volume = false;
   Real voxel = 0;

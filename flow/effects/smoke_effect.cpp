@@ -38,6 +38,7 @@ struct SmokeSettings {
   std::vector<PlannedSource> sources;
   Real lava_smoke = 0, lava_convection = 0, lava_from = 0;
   Real step = 0, warm_up = 0;
+  Vec3 color = Vec3::Ones();  ///< linear light
   std::vector<Partner> partners;
 };
 
@@ -151,6 +152,8 @@ class SmokeEffect final : public Effect {
     return all;
   }
 
+  std::optional<Vec3> draws_volumes() const override { return settings_.color; }
+
   std::size_t memory() const override { return grid_.memory(); }
   void add_to(StateHash& hash) const override {
     hash.add(time_);
@@ -257,6 +260,7 @@ SmokeSettings read(Parameters& p) {
   o.tolerance = p.number("tolerance", "", o.tolerance, {0, 0.1, true}, "of the projection: share of the divergence that it leaves");
   s.step = p.number("step", "s", 1. / 24, Parameters::positive(), "at most");
   s.warm_up = p.number("warm_up", "s", 0, {0, 1e4}, "its own sources have been open for so long as the film begins");
+  s.color = read_color(p, Vec3(0.45, 0.43, 0.42));
   s.lava_smoke = p.number("lava_smoke", "1/s", 0, Parameters::not_negative(), "that hot lava gives off: metres of density 1 a second");
   s.lava_convection = p.number("lava_convection", "W/(m2 K)", 0, Parameters::not_negative(), "from lava's surface into the air of its cell");
   s.lava_from = p.number("lava_from", "K", 900, {0, 5000}, "colder lava gives neither");

@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -53,6 +54,7 @@ struct NamedCloud {
   std::vector<Real> radius, temperature, age, opacity;
   std::vector<std::uint64_t> id;
   Vec3 color = Vec3::Ones();
+  bool soft = false;  ///< kGlow: flames that one sees through, not clots
   bool points = true, spheres = false;  ///< files: frames/NAME.####.ply of points, or of small spheres
 
   geometry::Points view() const {
@@ -109,9 +111,11 @@ class Effect {
   virtual bool makes_pieces() const { return false; }
   /// Surfaces of its own; their names do not change through a run.
   virtual std::vector<NamedMesh> meshes() const { return {}; }
-  /// Particles to draw, not to skin, and fields; for files (frames/NAME.####.ply, .vdb) and pictures. Names do not change through a run.
+  /// Particles to draw, not to skin, for files (frames/NAME.####.ply) and pictures. Names do not change through a run.
   virtual std::vector<NamedCloud> clouds() const { return {}; }
+  /// Fields for files (frames/NAME.####.vdb); in pictures where draws_volumes(), of that colour (linear light).
   virtual std::vector<geometry::GridVolume> volumes() const { return {}; }
+  virtual std::optional<Vec3> draws_volumes() const { return std::nullopt; }
 
   /// Once, when all effects of the scene are built; they outlive this one's steps. Of another effect it sees the last moment that
   /// it reached: those before it in the scene's order are at the end of the frame, those behind it at its beginning.
