@@ -91,7 +91,7 @@ class ParticleCloud {
 
  private:
   void advance(std::size_t begin, std::size_t end, Real dt);
-  void meet_solids(std::size_t first);
+  void meet_solids();
   template <class Self, class Archive>
   static void arrays(Self& self, Archive& io);
 
@@ -106,6 +106,9 @@ class ParticleCloud {
   std::vector<Real> born_, lifetime_, size_, temperature_;
   std::vector<std::uint64_t> id_;
   std::vector<std::uint8_t> stuck_, dead_;
+  // Of a step: those that do not lie, and theirs.
+  std::vector<Index> moving_;
+  std::vector<Vec3> moved_x_, moved_dx_, moved_v_;
   std::vector<geometry::Contact> found_;
 };
 

@@ -88,13 +88,13 @@ std::vector<Preset> make_presets() {
   e = {};
   e.speed = 0.5;
   e.spread = 0.5;
-  e.lifetime = 1.2;
+  e.lifetime = 1.4;
   e.lifetime_spread = 0.3;
-  e.size = 0.15;
+  e.size = 0.12;
   e.size_spread = 0.3;
   e.temperature = 1500;
-  all.push_back(make("fire", "tongues that rise, cool and go out", f, e, {true, true, Vec3(0.1, 0.1, 0.1), 0.3}));
-  all.back().cloud.cooling = 0.8;
+  all.push_back(make("fire", "tongues that rise, cool and go out", f, e, {true, true, Vec3(0.1, 0.1, 0.1), 0.22}));
+  all.back().cloud.cooling = 1.8;
 
   f = {};
   f.response = 0.3;

@@ -177,6 +177,24 @@ Lava take_lava(const TriMesh& mesh, const Vec3& origin) {
   return lava;
 }
 
+/// Light of the lava and of what glows in the air: of each speck a triangle as wide as its disk.
+GlowField glow_of(const Lava& lava, const Air& air, const Vec3& origin, const GlowField::Surroundings& surroundings) {
+  constexpr float kCorner = 1.5551f;  // [radii] of a triangle of a disk's area from its middle
+  std::vector<Vec3f> positions(lava.positions), glow(lava.glow);
+  std::vector<geometry::Triangle> triangles(lava.triangles.begin(), lava.triangles.end());
+  for (const Speck& s : air.specks) {
+    if (s.glow.isZero()) continue;
+    const auto first = static_cast<Index>(positions.size());
+    triangles.push_back({first, first + 1, first + 2});
+    for (int k = 0; k < 3; ++k) {
+      const float turn = 2 * static_cast<float>(kPi) * static_cast<float>(k) / 3, r = kCorner * static_cast<float>(s.radius);
+      positions.push_back((s.position - origin).cast<float>() + r * Vec3f(std::cos(turn), std::sin(turn), 0));
+      glow.push_back(s.glow.cast<float>() * static_cast<float>(s.opacity));
+    }
+  }
+  return GlowField(positions, triangles, glow, surroundings);
+}
+
 /// What a sample sees, before it is known whether the sun reaches it.
 struct Surface {
   bool hit = false, is_lava = false;
@@ -363,7 +381,10 @@ struct Picture {
   /// Water: Fresnel's mirror of one bounce, and down through it what lies there, red fading first; the body's own colour by the light
   /// that falls in.
   Vec3f water_light(const Surface& s, const Vec3f& d, bool lit) const {
-    Vec3f n = s.normal.dot(d) > 0 ? Vec3f(-s.normal) : s.normal;
+    // Smooth normals lean away from the viewer at a crest's edge: they are turned back until it is seen at a slant.
+    constexpr float kSlant = 0.03f;
+    Vec3f n = s.normal;
+    if (const float away = n.dot(d) + kSlant; away > 0) n = (n - away * d).normalized();
     const float lift = 1e-4f * s.distance + 1e-4f * ground.radius, cosine = saturate(-n.dot(d));
     const float out = 1 - cosine, o2 = out * out, fresnel = 0.02f + 0.98f * o2 * o2 * out;
     float way = 0;
@@ -386,8 +407,8 @@ struct Picture {
     if (lit) {
       // The sun, on ripples that the mesh does not have.
       const Vec3f half = (sky.sun_direction() - d).normalized();
-      const float h = std::max(0.0f, n.dot(half)), alpha2 = 0.012f, q = h * h * (alpha2 - 1) + 1;
-      light += sky.sun_light() * (0.25f * fresnel * alpha2 / (static_cast<float>(kPi) * q * q));
+      const float h = std::max(0.0f, n.dot(half)), alpha2 = 0.003f, q = h * h * (alpha2 - 1) + 1;
+      light += sky.sun_light() * (0.08f * fresnel * alpha2 / (static_cast<float>(kPi) * q * q));
     }
     return through_air(s.distance, d, light);
   }
@@ -518,7 +539,7 @@ Image Preview::render(const TriMesh& mesh, const PreviewOptions& options, const 
     return hit.hit.geomID == RTC_INVALID_GEOMETRY_ID ? ground.low : 10 * ground.radius - hit.ray.tfar;
   };
   surroundings.hidden = [&](const Vec3f& from, const Vec3f& to) { return occluded(ground_scene, from, to - from, 0.01f, 0.97f); };
-  const GlowField glow_field = options.glow_light > 0 ? GlowField(lava.positions, lava.triangles, lava.glow, surroundings) : GlowField();
+  const GlowField glow_field = options.glow_light > 0 ? glow_of(lava, air, ground.origin, surroundings) : GlowField();
 
   const Sky sky(options.sun_direction, options.sun, options.sky);
   const Lens lens(options, ground.origin);
