@@ -393,7 +393,10 @@ struct Picture {
     mirrored.normalize();
     const Surface above = second(s.position + lift * s.geometric, mirrored, s.distance, lift, way);
     const Vec3f body = s.albedo.cwiseProduct(sky.ambient(Vec3f::UnitZ()) + (lit ? 0.5f : 0.0f) * std::max(0.0f, sky.sun_direction().z()) * sky.sun_light() / static_cast<float>(kPi));
-    const Vec3f reflection = !above.hit ? sky.radiance(mirrored) : above.water > 0 ? body : radiance(above, mirrored, true);
+    // Other waves show the sky, too, from higher up.
+    Vec3f onward = mirrored;
+    onward.z() += 0.25f;
+    const Vec3f reflection = !above.hit ? sky.radiance(mirrored) : above.water > 0 ? Vec3f(mix(body, sky.radiance(onward.normalized()), 0.7f)) : radiance(above, mirrored, true);
     // Snell's law, air to water.
     const float eta = 1 / 1.33f, inner = std::sqrt(std::max(0.0f, 1 - eta * eta * (1 - cosine * cosine)));
     const Vec3f down = (eta * d + (eta * cosine - inner) * n).normalized();
