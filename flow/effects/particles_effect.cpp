@@ -129,6 +129,7 @@ class ParticlesEffect final : public Effect {
   std::size_t memory() const override { return cloud_->memory(); }
   void add_to(StateHash& hash) const override {
     hash.add(time_);
+    for (const PlannedEmitter& plan : plans_) hash.add(std::span<const Vec3>(plan.options.mesh.positions));  // what its file held
     cloud_->add_to(hash);
   }
   void save(StateWriter& out) const override {

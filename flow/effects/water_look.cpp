@@ -1,5 +1,6 @@
 #include "flow/effects/water_look.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "flow/effects/effect_table.h"
@@ -38,7 +39,13 @@ WaterSurface::WaterSurface(const WaterLook& look, const PlanCells& cells, const 
     : look_(look), cells_(cells), level_(level) {
   const auto nx = static_cast<std::size_t>(cells.nx), ny = static_cast<std::size_t>(cells.ny);
   const auto water = [&](std::size_t i, std::size_t j) { return depth[j * nx + i] > 0; };
-  // A quad with any corner in water is drawn: the ground hides what is not wet.
+  // A quad that comes within two cells of water is drawn: the ground hides what is not wet, and between cells it may dip.
+  const auto near_water = [&](std::size_t i, std::size_t j) {
+    for (std::size_t b = j > 0 ? j - 1 : 0; b <= std::min(j + 1, ny - 1); ++b)
+      for (std::size_t a = i > 0 ? i - 1 : 0; a <= std::min(i + 1, nx - 1); ++a)
+        if (water(a, b)) return true;
+    return false;
+  };
   std::vector<Index> vertex(depth.size(), kNone);
   const auto use = [&](std::size_t i, std::size_t j) {
     Index& v = vertex[j * nx + i];
@@ -50,7 +57,7 @@ WaterSurface::WaterSurface(const WaterLook& look, const PlanCells& cells, const 
   };
   for (std::size_t j = 0; j + 1 < ny; ++j)
     for (std::size_t i = 0; i + 1 < nx; ++i) {
-      if (!water(i, j) && !water(i + 1, j) && !water(i, j + 1) && !water(i + 1, j + 1)) continue;
+      if (!near_water(i, j) && !near_water(i + 1, j) && !near_water(i, j + 1) && !near_water(i + 1, j + 1)) continue;
       const Index a = use(i, j), b = use(i + 1, j), c = use(i + 1, j + 1), d = use(i, j + 1);
       // Split along alternating diagonals: no grain.
       if ((i + j) % 2 == 0) triangles_.insert(triangles_.end(), {{a, b, c}, {a, c, d}});
@@ -60,20 +67,16 @@ WaterSurface::WaterSurface(const WaterLook& look, const PlanCells& cells, const 
   for (std::size_t v = 0; v < vertex_cell_.size(); ++v) {
     const std::size_t i = vertex_cell_[v] % nx, j = vertex_cell_[v] / nx;
     if (water(i, j)) continue;
-    std::size_t found = 0;
-    const auto take = [&](std::size_t a, std::size_t b) {
-      if (found < 4 && water(a, b)) beside_[v][found++] = static_cast<Index>(b * nx + a);
-    };
-    if (i > 0) take(i - 1, j);
-    if (i + 1 < nx) take(i + 1, j);
-    if (j > 0) take(i, j - 1);
-    if (j + 1 < ny) take(i, j + 1);
-    if (found > 0) continue;
-    for (const int di : {-1, 1})
-      for (const int dj : {-1, 1}) {
+    // The nearest water cells, up to four, of those two away at most.
+    std::vector<std::pair<int, Index>> found;
+    for (int dj = -2; dj <= 2; ++dj)
+      for (int di = -2; di <= 2; ++di) {
         const int a = static_cast<int>(i) + di, b = static_cast<int>(j) + dj;
-        if (a >= 0 && b >= 0 && a < cells.nx && b < cells.ny) take(static_cast<std::size_t>(a), static_cast<std::size_t>(b));
+        if (a < 0 || b < 0 || a >= cells.nx || b >= cells.ny || !water(static_cast<std::size_t>(a), static_cast<std::size_t>(b))) continue;
+        found.emplace_back(di * di + dj * dj, static_cast<Index>(static_cast<std::size_t>(b) * nx + static_cast<std::size_t>(a)));
       }
+    std::sort(found.begin(), found.end());
+    for (std::size_t k = 0; k < std::min<std::size_t>(4, found.size()); ++k) beside_[v][k] = found[k].second;
   }
 }
 

@@ -22,8 +22,8 @@ void read_water(Parameters& p, WaterLook& look, Real& temperature, Real& boiling
 /// "color", "water" (WaterLook::clear, 0: no water) on every vertex of a mesh: the picture's renderer lets them mirror the sky and see down.
 void paint_water(geometry::TriMesh& mesh, const WaterLook& look);
 
-/// The mesh of water on a grid over ground: a vertex on each cell's middle that is water, and on the land beside it, so that it ends in the
-/// ground and not at a staircase.
+/// The mesh of water on a grid over ground: a vertex on each cell's middle that is water, and on the land up to two cells beside it, so that it
+/// ends in the ground and not at a staircase.
 class WaterSurface {
  public:
   ///   depth  of each cell at rest [m]; 0: land

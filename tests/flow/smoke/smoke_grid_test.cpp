@@ -96,7 +96,7 @@ Real drift_error(int n, bool sharp) {
   return sum / static_cast<Real>(grid.size());
 }
 
-TEST(SmokeGrid, CarriesToSecondOrderWithTheCorrectionAndToFirstWithout) {
+TEST(SmokeGridSlow, CarriesToSecondOrderWithTheCorrectionAndToFirstWithout) {
   const Real sharp = std::log2(drift_error(20, true) / drift_error(40, true)), dull = std::log2(drift_error(20, false) / drift_error(40, false));
   // The limiter flattens the ball's top, which costs some of the second order.
   EXPECT_GT(sharp, 1.6);
@@ -105,7 +105,7 @@ TEST(SmokeGrid, CarriesToSecondOrderWithTheCorrectionAndToFirstWithout) {
   EXPECT_LT(drift_error(40, true), drift_error(40, false) / 3);
 }
 
-TEST(SmokeGrid, LosesASixthOfItsSmokeInAClosedRoomThatHeatStirs) {
+TEST(SmokeGridSlow, LosesASixthOfItsSmokeInAClosedRoomThatHeatStirs) {
   SmokeOptions o = box(20, 20, 20);
   o.open.fill(false);
   SmokeGrid grid(o);
