@@ -71,6 +71,7 @@ Real column_factor(const Kernel& W, Real spacing, Real last_share) {
 HeatBudget operator+(HeatBudget a, const HeatBudget& b) {
   a.radiated += b.radiated;
   a.convected += b.convected;
+  a.quenched += b.quenched;
   a.ground += b.ground;
   a.dissipated += b.dissipated;
   return a;
@@ -153,6 +154,7 @@ HeatBudget Heat::step(Real dt, const Surroundings& s) {
   CHECK(s.ground_area.empty() || s.ground_temperature.size() == n);
   CHECK(s.ground_effusivity.empty() || s.ground_effusivity.size() == n);
   CHECK(s.dissipation.empty() || s.dissipation.size() == n);
+  CHECK(s.wet.empty() || s.wet.size() == n);
 
   raise_columns(s);
 
@@ -396,13 +398,14 @@ HeatBudget Heat::lose_column(std::size_t c, Real dt, const Surroundings& s, bool
     Real h = exposed > 0 ? kColumnStep * (column.age + beginning) : left;
     if (h > 0.999 * left) h = left;
     const ColumnLoss loss = step_column(column.H, h, column.depth, density_, shape_, options_.curve, options_.conductivity, options_.solid_conductivity,
-                                        options_.air, ends, column.surface_temperature);
+                                        law_of(i, s), ends, column.surface_temperature);
     budget.radiated += cross * loss.radiated;
     budget.convected += cross * loss.convected;
     budget.ground += cross * loss.ground;
     if (exposed > 0) column.age += h;
     left -= h;
   }
+  if (!s.wet.empty() && s.wet[i]) budget.quenched = budget.radiated + budget.convected;
   given_[i] += budget.ground;
   column.pending = column.pending_sky = column.pending_ground = 0;
   Real mean = 0;
@@ -418,7 +421,7 @@ HeatBudget Heat::lose_lump(std::size_t i, Real dt, const Surroundings& s) {
   const Real ground_T = area > 0 ? s.ground_temperature[i] : 0;
   if (sky <= 0 && G <= 0) return {};
   const EnthalpyCurve& curve = options_.curve;
-  const SurfaceLaw& air = options_.air;
+  const SurfaceLaw& air = law_of(i, s);
 
   const Real fastest = (sky * air.slope(curve.temperature(enthalpy_[i])) + G) / (mass_ * curve.heat_capacity);
   const int steps = static_cast<int>(std::clamp(std::ceil(dt * fastest / kLumpStep), 1.0, Real(kMaxLumpSteps)));
@@ -457,6 +460,7 @@ HeatBudget Heat::lose_lump(std::size_t i, Real dt, const Surroundings& s) {
     budget.ground += h * ground + (sky > 0 ? 0 : rest);
     enthalpy_[i] = H;
   }
+  if (!s.wet.empty() && s.wet[i]) budget.quenched = budget.radiated + budget.convected;
   given_[i] += budget.ground;
   refresh_particle(i);
   return budget;

@@ -34,6 +34,7 @@ struct HeatOptions {
 struct HeatBudget {
   Real radiated = 0, convected = 0;  ///< through exposed faces
   Real ground = 0;                   ///< into the ground
+  Real quenched = 0;                 ///< of radiated and convected: into water
   Real dissipated = 0;               ///< by viscous heating, gained
   int conduction_passes = 0;         ///< loops over all pairs
 };
@@ -98,6 +99,9 @@ class Heat {
     std::span<const Real> ground_temperature;  ///< of the undisturbed ground [K]; read where ground_area > 0
     std::span<const Real> dissipation;   ///< [W/m^3], >= 0; or empty
     std::span<const Real> ground_effusivity = {};  ///< b of what it touches there [J/(m^2 K s^0.5)]; 0, or empty: the options' ground
+    std::span<const std::uint8_t> wet = {};    ///< 1: its exposed face is under water, whose law holds in place of the air's; or empty. What an old crust
+                                               ///< has pending as it gets wet is lost by water's law, too
+    SurfaceLaw water = {};                     ///< air_temperature: the water's
   };
   /// Whether step(dt) will loop over the pairs. If not, neighbors may be of any size and age.
   bool conducts(Real dt) const { return options_.on && pair_time_ + dt >= interval_; }
@@ -160,6 +164,7 @@ class Heat {
   void refresh_particle(std::size_t i);
   Real conductivity(Real enthalpy) const;
   std::size_t last_cell() const { return static_cast<std::size_t>(shape_.cells - 1); }
+  const SurfaceLaw& law_of(std::size_t i, const Surroundings& s) const { return !s.wet.empty() && s.wet[i] ? s.water : options_.air; }
 
   HeatOptions options_;
   Real spacing_, density_, mass_, interval_, diffusion_time_;

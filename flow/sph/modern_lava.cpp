@@ -104,6 +104,8 @@ struct ModernLava::Impl {
   ViscositySolver viscosity;
   PressureSolver pressure;
   std::vector<Vec3> before_x;
+  WaterSource water;
+  std::vector<std::uint8_t> wet;
   // What points() shows.
   mutable std::vector<Real> radius, crust, age, p;
 
@@ -202,6 +204,7 @@ struct ModernLava::Impl {
     io.value("rested", self.rested);
     io.value("taken", self.taken);
     io.value("left_enthalpy", self.left_enthalpy);
+    io.value("owed_quenched", self.owed.quenched);
     io.value("owed_radiated", self.owed.radiated);
     io.value("owed_convected", self.owed.convected);
     io.value("owed_ground", self.owed.ground);
@@ -496,6 +499,10 @@ struct ModernLava::Impl {
     // Lists of the step's beginning are good enough for conduction; sleepers have none, and others of their own.
     Neighbors everyone;
     if (heat.conducts(dt) && !all) find_neighbors(x, everyone);
+    if (water.wet) {
+      wet.assign(size(), 0);
+      water.wet(x, wet);
+    }
     report.heat = heat.step(dt, {.x = x,
                                  .neighbors = all ? neighbors : everyone,
                                  .kernel = o.kernel,
@@ -505,7 +512,9 @@ struct ModernLava::Impl {
                                  .ground_area = grounded,
                                  .ground_temperature = ground_T,
                                  .dissipation = all ? std::span<const Real>(scratch) : std::span<const Real>(power),
-                                 .ground_effusivity = solids.any() ? std::span<const Real>(ground_b) : std::span<const Real>()});
+                                 .ground_effusivity = solids.any() ? std::span<const Real>(ground_b) : std::span<const Real>(),
+                                 .wet = water.wet ? std::span<const std::uint8_t>(wet) : std::span<const std::uint8_t>(),
+                                 .water = water.law});
     if (solids.any()) solids.warm(touches, heat.given(), heat.touched_temperature());
   }
 
@@ -666,6 +675,7 @@ struct ModernLava::Impl {
   void settle(ModernReport& report) {
     report.heat.radiated += owed.radiated;
     report.heat.convected += owed.convected;
+    report.heat.quenched += owed.quenched;
     report.heat.ground += owed.ground;
     report.heat.dissipated += owed.dissipated;
     owed = {};
@@ -736,6 +746,8 @@ void ModernLava::add(std::span<const Vec3> x, std::span<const Vec3> v, std::span
     m.frames.born(x[i], x[i]);
   }
 }
+
+void ModernLava::set_water(WaterSource water) { impl_->water = std::move(water); }
 
 Real ModernLava::take(std::span<const Index> which) {
   Impl& m = *impl_;

@@ -52,6 +52,14 @@ struct ModernOptions {
   Guards guards;             ///< all on, but for tests
 };
 
+/// Water that lava may run into: what of it is wet exchanges heat with water instead of air. Water neither carries nor moves it.
+///   wet  sets 1 where a point lies under water, in parallel; the others are 0 already
+///   law  of an exposed face under water; air_temperature: the water's
+struct WaterSource {
+  std::function<void(std::span<const Vec3> x, std::span<std::uint8_t> out)> wet;
+  SurfaceLaw law;
+};
+
 /// What one step did.
 struct ModernReport {
   Real dt = 0;                 ///< [s]
@@ -113,6 +121,9 @@ class ModernLava {
   /// Takes particles out, rising numbers (checked), for what becomes of them elsewhere. The heat [J] that went with them; they count
   /// neither as present nor as left (mass_taken). Numbers of those behind move up.
   Real take(std::span<const Index> which);
+
+  /// From the next step on; no part of what is saved.
+  void set_water(WaterSource water);
 
   /// One step of at most dt_max [s] > 0. A step whose viscosity solve fails (stays above ten times the tolerance), whose result is not finite,
   /// or which moves a particle by more than half a spacing is undone and tried with half the size, eight times and down to min_step; then

@@ -20,6 +20,21 @@
 namespace effuse {
 
 namespace {
+/// Tables of a scene that may name files, each by its key `file`: things, and emitters within particles.
+std::vector<flow::Node*> tables_with_files(const std::string& name, flow::Node& table) {
+  std::vector<flow::Node*> all;
+  const bool things = name == "obstacle" || name == "body" || name == "springs";
+  for (flow::Node& one : table.items) {
+    if (things) all.push_back(&one);
+    if (name != "particles") continue;
+    for (auto& [key, value] : one.entries)
+      if (key == "emitter")
+        for (flow::Node& emitter : value.items)
+          if (emitter.find("file")) all.push_back(&emitter);
+  }
+  return all;
+}
+
 /// The tables that decide the state of frame n, whatever the number of frames and the files made of it.
 std::string state_key(const flow::Node& resolved, const geometry::Terrain& terrain, const SolidThings& solids, const flow::Simulation& start) {
   StateHash hash;
@@ -30,8 +45,7 @@ std::string state_key(const flow::Node& resolved, const geometry::Terrain& terra
     if (name == "film") copy.set("frames", flow::Node{});
     // What files hold counts, not where they lie.
     if (name == "terrain") copy.set("file", flow::Node{});
-    if (name == "obstacle" || name == "body" || name == "springs")
-      for (flow::Node& one : copy.items) one.set("file", flow::Node{});
+    for (flow::Node* one : tables_with_files(name, copy)) one->set("file", flow::Node{});
     hash.add(importers::to_toml(part));
   }
   for (const flow::PlacedObstacle& each : solids.obstacles) hash.add(std::span<const Vec3>(each.shape.mesh().positions));
@@ -119,9 +133,8 @@ std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const
         for (const std::filesystem::path& path : terrain_paths) files.items.push_back(whole(std::filesystem::absolute(path).lexically_normal()));
         table.set("file", files.items.size() == 1 ? files.items.front() : files);
       }
-      if (name != "obstacle" && name != "body" && name != "springs") continue;
-      for (flow::Node& one : table.items)
-        if (const flow::Node* path = one.find("file"); path && !path->text.empty()) one.set("file", whole(std::filesystem::absolute(file.parent_path() / path->text).lexically_normal()));
+      for (flow::Node* one : tables_with_files(name, table))
+        if (const flow::Node* path = one->find("file"); path && !path->text.empty()) one->set("file", whole(std::filesystem::absolute(file.parent_path() / path->text).lexically_normal()));
     }
     loaded->resolved = importers::to_toml(resolved);
     loaded->key = state_key(resolved, *loaded->terrain, loaded->solids, *loaded->simulation);

@@ -162,11 +162,12 @@ geometry::TriMesh in_one_picture(geometry::TriMesh lava, const geometry::TriMesh
   // Only what the picture is made of goes on.
   for (const char* name : {"piece", "inner"}) cold.attributes.erase(name);
   for (const auto& [name, attribute] : lava.attributes) {
-    if (name == "color") continue;
+    if (name == "color" || name == "water") continue;
     geometry::VertexAttribute& own = cold.attributes[name];
     own.width = attribute.width;
     own.values.assign(n * static_cast<std::size_t>(attribute.width), name == "temperature" ? kAir : name == "crust" ? 1 : 0.0f);
   }
+  if (cold.attributes.contains("water")) lava.attributes["water"] = {1, std::vector<float>(lava.positions.size(), 0.0f)};
   if (lava.normals.empty()) cold.normals.clear();
   if (!lava.attributes.contains("color")) cold.attributes.erase("color");
   geometry::append(lava, cold);
