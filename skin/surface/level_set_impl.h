@@ -108,7 +108,7 @@ struct KnownVolumes {
 Real enclosed(const Blocks& blocks, float outside, const Field& phi, const Field& above, float shift);
 /// At shift 0, blocks that are known taken from there.
 Real enclosed(const Blocks& blocks, float outside, const Field& phi, const Field& above, KnownVolumes& known);
-inline constexpr int kShiftSteps = 64;
+inline constexpr int kShiftSteps = 128;
 struct Shift {
   int steps = 0;     ///< of 1 / kShiftSteps voxels
   Real exact = 0;    ///< the same, between two steps where the target is
