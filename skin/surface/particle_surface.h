@@ -25,7 +25,7 @@ class ParticleSurface {
 
   /// Takes points near the surface onto it, f = 0, by Newton's method, with their normals: of unit length, near the surface's; out: f's.
   /// Points that would go farther than a quarter of a spacing go less far, or stay; so do those within a spacing of the ground, where the
-  /// surface is cut and lifted, and those where f has no slope (creases, thin sheets). Sizes must agree (checked).
+  /// surface is cut and lifted, and those where f has a slope below 0.5 (creases, necks, thin sheets). Sizes must agree (checked).
   /// 2 us a point and thread. Same bits on any number of threads.
   void project(std::span<Vec3> x, std::span<Vec3> normals) const;
   /// The same for a mesh's vertices and normals (which it must have: checked), but no triangle is turned over: vertices of one that would
