@@ -297,7 +297,7 @@ EffectPlan read_smoke(Parameters& parameters, Real duration) {
   if (settings.box.size() == 6) plan.estimate.cells = static_cast<double>(settings.options.n[0]) * settings.options.n[1] * settings.options.n[2];
   plan.estimate.bytes = 330 * plan.estimate.cells;
   plan.estimate.steps = std::ceil((duration + settings.warm_up) / settings.step);
-  plan.estimate.seconds = plan.estimate.steps * plan.estimate.cells * (settings.options.sharp ? 2.5e-6 : 1.5e-6) / 1.8;
+  plan.estimate.seconds = plan.estimate.steps * plan.estimate.cells * (settings.options.sharp ? 8e-7 : 5.5e-7);  // measured at 64^3
   plan.misfits = [settings](const World& world) {
     std::vector<Fault> faults;
     lay_out(settings, world, faults);

@@ -9,7 +9,7 @@
 #include "geometry/base/parallel.h"
 #include "geometry/base/zones.h"
 #include "skin/surface/level_set_impl.h"
-#include "skin/surface/vdb_file.h"
+#include "skin/surface/vdb_file_internal.h"
 #include "skin/surface/vdb_layout.h"
 
 namespace effuse::skin {

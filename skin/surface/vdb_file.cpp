@@ -1,4 +1,4 @@
-#include "skin/surface/vdb_file.h"
+#include "skin/surface/vdb_file_internal.h"
 
 #include <fmt/format.h>
 #include <openvdb/io/File.h>

@@ -8,7 +8,7 @@
 #include "geometry/base/check.h"
 #include "geometry/base/error.h"
 #include "geometry/base/zones.h"
-#include "skin/surface/vdb_file.h"
+#include "skin/surface/vdb_file_internal.h"
 
 namespace effuse::skin {
 
