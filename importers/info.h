@@ -16,6 +16,7 @@ struct FileFacts {
 ///   terrain grids  format, size, spacing, area on the map, heights, holes, coordinate system, origin, closed depressions
 ///   meshes         validate()'s report, box, area, volume when it encloses one, attributes
 ///   scenes (TOML)  name, effects, tables
+///   clips          joints or markers, frames, travel (.bvh, .trc)
 /// and what its reader noted. Throws InputError as the readers do; for a file none of them reads, it
 /// names those that there are.
 FileFacts file_facts(const std::filesystem::path& file);

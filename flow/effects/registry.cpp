@@ -1,7 +1,9 @@
 #include "flow/effects/registry.h"
 
 #include "flow/effects/bodies_effect.h"
+#include "flow/effects/elastic_effect.h"
 #include "flow/effects/lava.h"
+#include "flow/effects/plants_effect.h"
 #include "flow/effects/springs_effect.h"
 
 namespace effuse::flow {
@@ -10,6 +12,8 @@ std::span<const EffectKind> effect_kinds() {
   static const EffectKind kinds[] = {
       {"lava", "molten rock on smoothed particles, running over the terrain", read_lava},
       {"springs", "mass points and springs: jello, cloth, soft solids", read_springs, false, true},
+      {"elastic", "finite elements: soft, stiff or brittle solids", read_elastic, false, true},
+      {"plants", "trees, bushes and grass by L-systems: they sway, catch fire beside lava and burn down", read_plants, false, true},
       {"bodies", "rigid bodies, joints and moving obstacles, by themselves where there is no lava", read_bodies_effect, true},
   };
   return kinds;

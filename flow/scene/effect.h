@@ -30,10 +30,11 @@ struct World {
   std::function<geometry::TriMesh(const PlannedForm&)> mesh = {};
 };
 
-/// A surface of one moment, for files (frames/NAME.####.ply) and pictures; "color" is linear light.
+/// A surface of one moment, for files (frames/NAME.####.ply) and pictures; "color" is linear light, "glow" what shines of itself.
 struct NamedMesh {
   std::string name;
   geometry::TriMesh mesh;
+  Real since = -1;  ///< it has been the same, bit for bit, from this time on [s]; negative: it may have changed just now
 };
 
 /// What an effect is expected to cost: for `effuse check`.
@@ -79,6 +80,12 @@ class Effect {
   virtual std::vector<SolidPiece> pieces() const { return {}; }
   /// Whether there ever may be pieces that belong to no body of the scene.
   virtual bool makes_pieces() const { return false; }
+
+  /// Once, when all effects of the scene are built; they outlive this one's steps. Of another effect it sees the last moment that
+  /// it reached: those before it in the scene's order are at the end of the frame, those behind it at its beginning.
+  virtual void meet(const std::vector<Effect*>& others) { static_cast<void>(others); }
+  /// Where it burns: middles and half heights of flames, their temperature, and the speed of what rises.
+  virtual geometry::Points fires() const { return {}; }
   /// Surfaces of its own; their names do not change through a run.
   virtual std::vector<NamedMesh> meshes() const { return {}; }
   virtual std::size_t memory() const = 0;  ///< bytes held

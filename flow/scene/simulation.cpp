@@ -46,6 +46,12 @@ bool undamaged(std::string_view checkpoint) {
 
 Simulation::Simulation(const Scene& scene, const World& world) : scene_(&scene) {
   for (const EffectPlan& plan : scene.effects) effects_.push_back(plan.build(world));
+  for (const auto& effect : effects_) {
+    std::vector<Effect*> others;
+    for (const auto& other : effects_)
+      if (other != effect) others.push_back(other.get());
+    effect->meet(others);
+  }
 }
 
 bool Simulation::advance(const std::function<bool()>& keep_going) {

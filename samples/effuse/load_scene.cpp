@@ -30,11 +30,15 @@ std::string state_key(const flow::Node& resolved, const geometry::Terrain& terra
     if (name == "film") copy.set("frames", flow::Node{});
     // What files hold counts, not where they lie.
     if (name == "terrain") copy.set("file", flow::Node{});
-    if (name == "obstacle" || name == "body" || name == "springs")
+    if (name == "obstacle" || name == "body" || name == "springs" || name == "elastic" || name == "figure")
       for (flow::Node& one : copy.items) one.set("file", flow::Node{});
     hash.add(importers::to_toml(part));
   }
-  for (const flow::PlacedObstacle& each : solids.obstacles) hash.add(std::span<const Vec3>(each.shape.mesh().positions));
+  for (const flow::PlacedObstacle& each : solids.obstacles) {
+    hash.add(std::span<const Vec3>(each.shape.mesh().positions));
+    // Of a figure, its clip: of scenes' own obstacles the tables say it, too.
+    for (const geometry::PoseKey& key : each.track.keys()) hash.add(std::span<const Vec3>(&key.pose.position, 1));
+  }
   for (const flow::PlacedBody& each : solids.bodies) hash.add(std::span<const Vec3>(each.mesh.positions));
   hash.add(std::span<const Vec3>(terrain.mesh().positions));
   hash.add(terrain.georeference().origin.x());
@@ -84,6 +88,8 @@ std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const
     SolidThings& solids = loaded->solids;
     if (solids.obstacles.size() == scene.obstacles.size() && solids.bodies.size() == scene.bodies.size())
       solids.joints = load_joints(scene, solids.obstacles, solids.bodies, *loaded->terrain, faults, loaded->notes);
+    // Behind the scene's own obstacles, whose numbers joints have.
+    for (flow::PlacedObstacle& bone : load_figures(scene, file.parent_path(), *loaded->terrain, faults, loaded->notes)) solids.obstacles.push_back(std::move(bone));
   }
   const auto world = [&] {
     return flow::World{&*loaded->terrain, scene.seed, &loaded->solids.obstacles, &loaded->solids.bodies, &loaded->solids.joints, scene.body_settings,
@@ -114,7 +120,7 @@ std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const
         for (const std::filesystem::path& path : terrain_paths) files.items.push_back(whole(std::filesystem::absolute(path).lexically_normal()));
         table.set("file", files.items.size() == 1 ? files.items.front() : files);
       }
-      if (name != "obstacle" && name != "body" && name != "springs") continue;
+      if (name != "obstacle" && name != "body" && name != "springs" && name != "elastic" && name != "figure") continue;
       for (flow::Node& one : table.items)
         if (const flow::Node* path = one.find("file"); path && !path->text.empty()) one.set("file", whole(std::filesystem::absolute(file.parent_path() / path->text).lexically_normal()));
     }

@@ -7,6 +7,7 @@
 #include "geometry/base/check.h"
 #include "geometry/base/error.h"
 #include "geometry/procedural/primitives.h"
+#include "importers/clips/read_bvh.h"
 #include "importers/mesh/import_mesh.h"
 #include "samples/effuse/solid_look.h"
 
@@ -43,6 +44,21 @@ std::vector<flow::PlacedObstacle> load_obstacles(const flow::Scene& scene, const
       if (placed.size() > before) notes.push_back(fmt::format("obstacle '{}': {}", plan.name, geometry::to_string(placed.back().shape.report())));
     } catch (const InputError& error) {
       faults.insert(faults.end(), error.faults().begin(), error.faults().end());
+    }
+  }
+  return placed;
+}
+
+std::vector<flow::PlacedObstacle> load_figures(const flow::Scene& scene, const std::filesystem::path& folder, const geometry::Terrain& terrain, std::vector<Fault>& faults,
+                                               std::vector<std::string>& notes) {
+  std::vector<flow::PlacedObstacle> placed;
+  for (const flow::PlannedFigure& plan : scene.figures) {
+    if (plan.file.empty() || plan.path.size() < 2) continue;
+    const std::filesystem::path path = std::filesystem::path(plan.file).is_relative() ? folder / plan.file : std::filesystem::path(plan.file);
+    try {
+      flow::place_figure(plan, importers::read_bvh(path, plan.scale), terrain, scene.frame_time(scene.frames), placed, faults, notes);
+    } catch (const InputError& error) {
+      for (const Fault& fault : error.faults()) faults.push_back({plan.file_place, to_string(fault)});
     }
   }
   return placed;
@@ -144,21 +160,28 @@ geometry::TriMesh SolidThings::at(Real time, const std::vector<geometry::RigidPo
   return all;
 }
 
+geometry::TriMesh for_picture(geometry::TriMesh mesh) {
+  const std::size_t numbers = 3 * mesh.positions.size();
+  std::erase_if(mesh.attributes, [&](const auto& each) { return (each.first != "color" && each.first != "glow") || each.second.values.size() != numbers; });
+  if (!mesh.attributes.contains("color")) mesh.attributes["color"] = {3, std::vector<float>(numbers, 0.25f)};
+  if (!mesh.attributes.contains("glow")) mesh.attributes["glow"] = {3, std::vector<float>(numbers, 0)};
+  return mesh;
+}
+
 geometry::TriMesh in_one_picture(geometry::TriMesh lava, const geometry::TriMesh& obstacles) {
   if (obstacles.triangles.empty()) return lava;
-  geometry::TriMesh cold = obstacles;
+  geometry::TriMesh cold = for_picture(obstacles);
   const std::size_t n = cold.positions.size();
-  if (lava.positions.empty()) return obstacles;
-  // Only what the picture is made of goes on.
-  for (const char* name : {"piece", "inner"}) cold.attributes.erase(name);
+  if (lava.positions.empty()) return cold;
   for (const auto& [name, attribute] : lava.attributes) {
-    if (name == "color") continue;
+    if (cold.attributes.contains(name)) continue;
     geometry::VertexAttribute& own = cold.attributes[name];
     own.width = attribute.width;
     own.values.assign(n * static_cast<std::size_t>(attribute.width), name == "temperature" ? kAir : name == "crust" ? 1 : 0.0f);
   }
   if (lava.normals.empty()) cold.normals.clear();
-  if (!lava.attributes.contains("color")) cold.attributes.erase("color");
+  for (const char* name : {"color", "glow"})
+    if (!lava.attributes.contains(name)) cold.attributes.erase(name);
   geometry::append(lava, cold);
   return lava;
 }
@@ -170,7 +193,7 @@ void check_camera_among(const SolidThings& things, const skin::SkinSettings& set
     for (const flow::PlacedObstacle& each : things.obstacles) {
       const geometry::RigidPose pose = each.track.at(scene.frame_time(frame));
       if (!each.shape.inside(pose.body(eye))) continue;
-      throw InputError(settings.camera_place, fmt::format("preview: in frame {} the camera stands in obstacle '{}'; more elevation, another azimuth or distance would do", frame, each.name));
+      throw InputError(settings.camera.place, fmt::format("preview: in frame {} the camera stands in obstacle '{}'; more elevation, another azimuth or distance would do", frame, each.name));
     }
   }
 }
