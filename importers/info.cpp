@@ -6,9 +6,11 @@
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "geometry/base/error.h"
 #include "geometry/mesh/measure.h"
+#include "geometry/mesh/self_intersections.h"
 #include "geometry/mesh/validate.h"
 #include "geometry/motion/walk.h"
 #include "importers/clips/read_bvh.h"
@@ -33,9 +35,11 @@ void add_notes(Lines& lines, const Lines& notes) {
   for (const std::string& note : notes) lines.push_back("note: " + note);
 }
 
-FileFacts describe_grid(const fs::path& file) {
+FileFacts describe_grid(const fs::path& file, const ReadLimits& limits) {
   using json = nlohmann::ordered_json;
-  DemGrid grid = import_dem({file});
+  DemOptions options;
+  options.limits = limits;
+  DemGrid grid = import_dem({file}, options);
   const std::string format = grid.format;
   const TerrainImport import = terrain_from_grid(std::move(grid), file.string());
   const geometry::HeightField& field = *import.terrain.height_field();
@@ -97,24 +101,73 @@ FileFacts describe_grid(const fs::path& file) {
   return facts;
 }
 
-Lines describe_mesh(const fs::path& file) {
-  const MeshImport import = import_mesh(file);
-  const geometry::MeshReport report = geometry::validate(import.mesh);
-  const Box3 box = geometry::bounds(import.mesh);
-  Lines lines;
+FileFacts describe_mesh(const fs::path& file, const ReadLimits& limits) {
+  using json = nlohmann::ordered_json;
+  MeshOptions options;
+  options.limits = limits;
+  const MeshImport import = import_mesh(file, options);
+  const geometry::TriMesh& mesh = import.mesh;
+  const geometry::MeshReport report = geometry::validate(mesh);
+  const Box3 box = geometry::bounds(mesh);
+  const MeshFrame& frame = import.frame;
+  FileFacts facts;
+  Lines& lines = facts.lines;
   lines.push_back("mesh: " + to_string(report));
-  lines.push_back(fmt::format("box: {:.6g} .. {:.6g}, {:.6g} .. {:.6g}, {:.6g} .. {:.6g} m", box.min().x(), box.max().x(), box.min().y(),
+  std::optional<std::size_t> crossings;
+  if (report.triangles <= kMostTested) crossings = geometry::self_intersections(mesh).size();
+  lines.push_back(!crossings ? fmt::format("self-intersections: not looked for, in more than {} triangles", kMostTested)
+                             : *crossings == 0 ? std::string("self-intersections: none") : fmt::format("self-intersections: {} pairs of triangles", *crossings));
+  lines.push_back(fmt::format("box: {:.10g} .. {:.10g}, {:.10g} .. {:.10g}, {:.10g} .. {:.10g} m", box.min().x(), box.max().x(), box.min().y(),
                               box.max().y(), box.min().z(), box.max().z()));
-  lines.push_back(fmt::format("size: {:.6g} x {:.6g} x {:.6g} m, area {:.6g} m2{}", box.sizes().x(), box.sizes().y(), box.sizes().z(),
-                              geometry::surface_area(import.mesh),
-                              report.solid() ? fmt::format(", volume {:.6g} m3", geometry::signed_volume(import.mesh)) : ""));
-  std::string attributes = import.mesh.normals.empty() ? "" : "normals";
-  for (const auto& [name, attribute] : import.mesh.attributes)
-    attributes += fmt::format("{}{}{}", attributes.empty() ? "" : ", ", printable(name, 40),
-                              attribute.width > 1 ? fmt::format(" ({})", attribute.width) : "");
+  const Real area = geometry::surface_area(mesh);
+  lines.push_back(fmt::format("size: {:.6g} x {:.6g} x {:.6g} m, area {:.6g} m2{}", box.sizes().x(), box.sizes().y(), box.sizes().z(), area,
+                              report.solid() ? fmt::format(", volume {:.6g} m3", geometry::signed_volume(mesh)) : ""));
+  // Up and unit: what the file says, or what its shape suggests.
+  const UpAxis guess = guess_up(mesh);
+  const bool says_up = frame.up != UpAxis::kUnknown, says_unit = frame.metres_per_unit > 0;
+  std::string up = says_up ? fmt::format("{}, by {}", name_of(frame.up), frame.source) : guess == UpAxis::kUnknown ? std::string("the file does not say; z is assumed") : fmt::format("the file does not say; it looks along {}{}", name_of(guess), guess == UpAxis::kZ ? "" : ", though z is assumed (--up)");
+  lines.push_back("up axis: " + up);
+  lines.push_back(says_unit ? fmt::format("unit: {:g} m, by {}", frame.metres_per_unit, frame.source) : std::string("unit: the file does not say; metres are assumed"));
+  if (frame.origin != Vec3::Zero() || !frame.crs.empty()) lines.push_back(fmt::format("origin on the map: {:.10g}, {:.10g}, {:.10g}", frame.origin.x(), frame.origin.y(), frame.origin.z()));
+  std::string attributes = mesh.normals.empty() ? "" : "normals";
+  json names = json::array();
+  for (const auto& [name, attribute] : mesh.attributes) {
+    names.push_back(printable(name, 40));
+    attributes += fmt::format("{}{}{}", attributes.empty() ? "" : ", ", printable(name, 40), attribute.width > 1 ? fmt::format(" ({})", attribute.width) : "");
+  }
   lines.push_back("attributes: " + (attributes.empty() ? std::string("none") : attributes));
   add_notes(lines, import.notes);
-  return lines;
+
+  const auto list = [](const Vec3& v) { return json::array({v.x(), v.y(), v.z()}); };
+  json values;
+  values["kind"] = "mesh";
+  values["format"] = lower_extension(file).substr(1);
+  values["vertices"] = report.vertices;
+  values["triangles"] = report.triangles;
+  values["components"] = report.components;
+  values["closed"] = report.closed();
+  values["manifold"] = report.manifold();
+  values["oriented"] = report.oriented();
+  values["border_edges"] = report.boundary_edges;
+  values["non_manifold_edges"] = report.non_manifold_edges;
+  values["non_manifold_vertices"] = report.non_manifold_vertices;
+  values["misoriented_edges"] = report.misoriented_edges;
+  values["degenerate_triangles"] = report.zero_area + report.repeated_indices;
+  values["self_intersections"] = crossings ? json(*crossings) : json();
+  values["low"] = list(box.min());
+  values["high"] = list(box.max());
+  values["area_m2"] = area;
+  values["volume_m3"] = report.solid() ? json(geometry::signed_volume(mesh)) : json();
+  values["up"] = says_up ? json(name_of(frame.up)) : json();
+  values["up_guess"] = guess == UpAxis::kUnknown ? json() : json(name_of(guess));
+  values["metres_per_unit"] = says_unit ? json(frame.metres_per_unit) : json();
+  values["origin"] = list(frame.origin);
+  values["crs"] = frame.crs;
+  values["normals"] = !mesh.normals.empty();
+  values["attributes"] = names;
+  values["notes"] = import.notes;
+  facts.values = values.dump(-1, ' ', false, json::error_handler_t::replace);
+  return facts;
 }
 
 Lines describe_scene(const fs::path& file) {
@@ -174,11 +227,11 @@ Lines describe_points(const fs::path& file) {
 
 }  // namespace
 
-FileFacts file_facts(const fs::path& file) {
+FileFacts file_facts(const fs::path& file, const ReadLimits& limits) {
   if (lower_extension(file) == ".toml") return {describe_scene(file), ""};
   if (lower_extension(file) == ".bvh") return {describe_skeleton(file), ""};
   if (lower_extension(file) == ".trc") return {describe_points(file), ""};
-  return is_dem(file) ? describe_grid(file) : FileFacts{describe_mesh(file), ""};
+  return is_dem(file) ? describe_grid(file, limits) : describe_mesh(file, limits);
 }
 
 std::vector<std::string> describe_file(const fs::path& file) { return file_facts(file).lines; }

@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "importers/read_apart.h"
+
 namespace effuse::importers {
 
 /// What a file holds.
@@ -14,13 +16,16 @@ struct FileFacts {
 
 /// The facts of a file:
 ///   terrain grids  format, size, spacing, area on the map, heights, holes, coordinate system, origin, closed depressions
-///   meshes         validate()'s report, box, area, volume when it encloses one, attributes
+///   meshes         validate()'s report, pairs of triangles that cut through one another (of up to kMostTested triangles),
+///                  box, area, volume when it encloses one, attributes, what the file says of up axis, unit and place, or a guess
 ///   scenes (TOML)  name, effects, tables
 ///   clips          joints or markers, frames, travel (.bvh, .trc)
 /// and what its reader noted. Throws InputError as the readers do; for a file none of them reads, it
-/// names those that there are.
-FileFacts file_facts(const std::filesystem::path& file);
+/// names those that there are. limits: of the readers of meshes and grids.
+FileFacts file_facts(const std::filesystem::path& file, const ReadLimits& limits = {});
 /// Its lines.
 std::vector<std::string> describe_file(const std::filesystem::path& file);
+
+inline constexpr std::size_t kMostTested = 2'000'000;  ///< a few seconds
 
 }  // namespace effuse::importers

@@ -23,10 +23,13 @@ std::vector<std::string> names(const std::string_view (&list)[N]) {
 
 class ClassicLavaEffect final : public Effect {
  public:
-  ClassicLavaEffect(const ClassicOptions& options, std::vector<Vent> vents, const geometry::Terrain& terrain)
-      : lava_(options, std::move(vents),
+  ClassicLavaEffect(const ClassicOptions& options, const std::vector<Vent>& vents, const geometry::Terrain& terrain)
+      : lava_(options, vents,
               {[terrain](std::span<const Vec3> x, Real reach, std::span<geometry::Contact> out) { terrain.contacts(x, reach, out); }},
-              [terrain](const Vec3& p) { return terrain.height(p.x(), p.y()).has_value(); }) {}
+              [terrain](const Vec3& p) { return terrain.height(p.x(), p.y()).has_value(); }) {
+    for (const Vent& vent : vents)
+      if (vent.rate > 0) vents_.push_back({vent.from, vent.to, vent.width, vent.start, vent.stop});
+  }
 
   std::string_view name() const override { return "lava"; }
   Real time() const override { return lava_.time(); }
@@ -39,6 +42,11 @@ class ClassicLavaEffect final : public Effect {
   geometry::Points points() const override { return lava_.points(); }
   Real volume() const override { return lava_.volume(); }
   Real spacing() const override { return lava_.options().spacing; }
+  FlowView flow() const override {
+    const geometry::Points p = lava_.points();
+    return {p.position, p.velocity, p.temperature, p.surface, spacing()};
+  }
+  std::vector<Opening> openings() const override { return vents_; }
   std::size_t memory() const override { return lava_.memory(); }
   void add_to(StateHash& hash) const override { lava_.add_to(hash); }
   void save(StateWriter& out) const override {
@@ -82,6 +90,7 @@ class ClassicLavaEffect final : public Effect {
     io.value("max_temperature", self.last_.max_temperature);
   }
 
+  std::vector<Opening> vents_;
   ClassicLava lava_;
   sph::StepReport last_;
   std::size_t steps_ = 0, retries_ = 0;

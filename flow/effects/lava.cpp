@@ -54,6 +54,21 @@ void refuse_blocked_vents(const std::vector<PlannedVent>& plans, const std::vect
   }
 }
 
+/// Particles that the ground, or all vents, are no match for: nothing would flow.
+void refuse_giant_particles(const std::vector<PlannedVent>& vents, Real spacing, const Place& place, const geometry::Terrain& terrain, std::vector<Fault>& faults) {
+  constexpr Real kAcross = 4, kWider = 5;  // particles on the ground's narrower side at least; spacings a vent may be narrower than one
+  const Real across = terrain.bounds().sizes().head<2>().minCoeff();
+  if (!(kAcross * spacing <= across)) {
+    faults.push_back({place, fmt::format("lava.spacing: particles of {:.4g} m on a terrain {:.4g} m across, wanted at least {:.0f} side by side: {:.3g} m or less", spacing, across, kAcross, across / kAcross)});
+    return;
+  }
+  for (const PlannedVent& plan : vents) {
+    const Real size = std::max(plan.vent.width, (plan.to - plan.from).norm());
+    if (plan.located && size > 0 && spacing > kWider * size)
+      faults.push_back({place, fmt::format("lava.spacing: particles of {:.4g} m from a vent {:.4g} m across (line {}), wanted a vent at most {:.0f} times narrower than a particle", spacing, size, plan.place.line, kWider)});
+  }
+}
+
 }  // namespace
 
 EffectPlan read_lava(Parameters& p, Real duration) {
@@ -86,8 +101,9 @@ EffectPlan read_lava(Parameters& p, Real duration) {
                               plan.estimate.steps, kMostSteps, model.sets_the_step));
     }
   }
-  plan.misfits = [vents, spacing = model.spacing, obstacles = model.obstacles, place = p.place("model")](const World& world) {
+  plan.misfits = [vents, spacing = model.spacing, obstacles = model.obstacles, place = p.place("model"), size = p.place("spacing")](const World& world) {
     std::vector<Fault> faults;
+    if (spacing > 0) refuse_giant_particles(vents, spacing, size, *world.terrain, faults);
     const bool solids = (world.obstacles && !world.obstacles->empty()) || (world.bodies && !world.bodies->empty());
     if (!obstacles && solids) faults.push_back({place, "the classic model knows the terrain only: [[obstacle]] and [[body]] go with model = \"modern\""});
     refuse_blocked_vents(vents, place_vents(vents, *world.terrain, faults), world, spacing, faults);

@@ -46,6 +46,7 @@ class ModernLavaEffect final : public Effect {
     if (blocks.on) blocks_.emplace(blocks, options.spacing);
     for (const Vent& vent : vents) {
       if (vent.rate <= 0) continue;
+      vents_.push_back({vent.from, vent.to, vent.width, vent.start, vent.stop});
       const Real area = static_cast<Real>(vent.lattice(options.spacing).size()) * options.spacing * options.spacing;
       openings_.push_back({vent.start, vent.stop, options.courant * options.spacing * area / vent.rate, vent.lattice(options.spacing), (vent.from + vent.to) / 2});
     }
@@ -58,6 +59,24 @@ class ModernLavaEffect final : public Effect {
 
   std::string_view name() const override { return "lava"; }
   Real time() const override { return lava_.time(); }
+
+  void meet(const std::vector<Effect*>& others) override {
+    std::vector<const Water*> waters;
+    for (const Effect* other : others)
+      if (const Water* water = other->water(); water && water->boiling() > 0) waters.push_back(water);
+    if (waters.empty() || !heat_) return;
+    quenched_ = true;
+    // Where several lie over one another the first one's temperature counts for all.
+    const sph::SurfaceLaw law{lava_.options().heat.air.emissivity, false, waters.front()->boiling(), waters.front()->temperature()};
+    lava_.set_water({[waters](std::span<const Vec3> x, std::span<std::uint8_t> wet) {
+                       for (const Water* water : waters) water->wet(x, wet);
+                     },
+                     law});
+  }
+  FlowView flow() const override {
+    return {lava_.positions(), lava_.velocities(), heat_ ? lava_.heat().surface_temperature() : lava_.temperatures(), lava_.surface(), spacing()};
+  }
+  std::vector<flow::Opening> openings() const override { return vents_; }
 
   void step(Real t_end) override {
     if (crammed_steps_ >= kMostCrammedSteps)
@@ -156,6 +175,7 @@ class ModernLavaEffect final : public Effect {
                                        {"stored_J", t.stored},
                                        {"left_J", t.left}})
         figures.emplace_back(key, value);
+      if (quenched_) figures.emplace_back("quenched_J", t.quenched);
       for (std::size_t k = 0; k < solids_->names().size(); ++k) {
         const SolidWorld::Warmth& warmth = solids_->warmth()[k];
         const std::string& name = figure_names_[k];
@@ -182,7 +202,7 @@ class ModernLavaEffect final : public Effect {
 
  private:
   /// A vent's times, and the longest step while it is open [s].
-  struct Opening {
+  struct Mouth {
     Real start, stop, step;
     std::vector<Vec3> sites;
     Vec3 middle;
@@ -192,7 +212,7 @@ class ModernLavaEffect final : public Effect {
   /// steps of its own speed, or its first particles come out on top of one another.
   Real longest_step(Real wanted) const {
     const Real now = lava_.time();
-    for (const Opening& o : openings_)
+    for (const Mouth& o : openings_)
       if (now < o.stop && now + wanted > o.start) wanted = std::min(wanted, std::max(o.step, o.start - now));
     return wanted;
   }
@@ -201,7 +221,7 @@ class ModernLavaEffect final : public Effect {
   std::string blocked_vents(Real dt) const {
     std::string text;
     const Real now = lava_.time();
-    for (const Opening& o : openings_) {
+    for (const Mouth& o : openings_) {
       if (now + dt < o.start || now >= o.stop) continue;
       std::optional<SolidWorld::Near> worst;
       for (const Vec3& site : o.sites) {
@@ -223,6 +243,7 @@ class ModernLavaEffect final : public Effect {
     Real smallest_step = 1e9, largest_density_error = 0;
     Real unsolved = 0, divergence_error = 0, viscosity_residual = 0;  // steps; worst of all
     Real crushed = 0, stopped = 0;  // particles among obstacles, once a step each (geometry::Slid)
+    Real quenched = 0;  // of radiated and convected: into water
     Real radiated = 0, convected = 0, ground = 0, viscous = 0, vent = 0, left = 0;
     Real stored = 0;  // now
   };
@@ -232,6 +253,7 @@ class ModernLavaEffect final : public Effect {
     const sph::HeatBudget& booked = last_.heat;
     t.radiated += booked.radiated;
     t.convected += booked.convected;
+    t.quenched += booked.quenched;
     t.ground += booked.ground;
     t.viscous += booked.dissipated;
     // The newest particles stand at the end, and nothing has touched their heat.
@@ -260,6 +282,7 @@ class ModernLavaEffect final : public Effect {
     io.value("viscosity_residual", t.viscosity_residual);
     io.value("radiated", t.radiated);
     io.value("convected", t.convected);
+    io.value("quenched", t.quenched);
     io.value("ground", t.ground);
     io.value("viscous", t.viscous);
     io.value("vent", t.vent);
@@ -283,7 +306,9 @@ class ModernLavaEffect final : public Effect {
   Vec3 origin_;  // of the map
   geometry::Terrain terrain_;
   std::optional<CrustBlocks> blocks_;
-  std::vector<Opening> openings_;
+  std::vector<Mouth> openings_;
+  std::vector<flow::Opening> vents_;
+  bool quenched_ = false;  // by water
   std::vector<std::string> figure_names_;  // of obstacles and bodies
   ModernReport last_;
   Totals totals_;

@@ -25,6 +25,7 @@ namespace effuse::flow {
 /// and, where heat is computed, enthalpies (0 at 0 K) [J], with vent + viscous = stored + radiated + convected + ground +
 /// left to rounding:
 ///   radiated_J convected_J ground_J            lost, as booked so far (Heat)
+///   quenched_J                                 of radiated and convected, into the scene's water; where there is any
 ///   vent_J                                     came out of vents
 ///   viscous_J                                  gained by friction inside
 ///   stored_J*                                  in the particles there are

@@ -6,6 +6,7 @@
 #include "geometry/base/check.h"
 #include "geometry/base/error.h"
 #include "geometry/base/parallel.h"
+#include "geometry/base/random.h"
 #include "geometry/base/zones.h"
 #include "geometry/procedural/noise.h"
 
@@ -14,6 +15,7 @@ namespace effuse::flow::particles {
 namespace {
 constexpr std::size_t kGrain = 4096;
 constexpr Real kEddyStrength = 1.6;   // of the noise's curl per unit of amplitude: its deviation is then about the turbulence
+constexpr std::uint64_t kThinning = 20;  // stream of an emitter's seed, of none of its own numbers
 constexpr std::uint64_t kEddySeed[] = {0xed01, 0xed02, 0xed03};
 enum Death : std::uint8_t { kAlive, kAged, kLeft, kFallen };
 
@@ -39,20 +41,24 @@ Real ParticleCloud::temperature(std::size_t i) const {
   return options_.air_temperature + (temperature_[i] - options_.air_temperature) * std::exp(-age(i) / options_.cooling);
 }
 
-void ParticleCloud::step(Real dt, std::span<const Vec3> sources, std::span<const Vec3> source_velocities) {
+void ParticleCloud::step(Real dt, std::span<const Sources> sources) {
   ZONE("particles");
   CHECK_GT(dt, 0);
+  if (!sources.empty()) CHECK_EQ(sources.size(), emitters_.size());
   // Newborns join with their birth's position; their own step is from their birth to the step's end.
   const std::size_t old = size();
   const Real end = time_ + dt;
   for (std::size_t e = 0; e < emitters_.size(); ++e) {
     const std::uint64_t until = emitters_[e].born_by(end);
-    if (emitters_[e].options().shape == EmitterShape::kPoints && sources.empty()) {
+    const bool from_points = emitters_[e].options().shape == EmitterShape::kPoints;
+    const Sources own = from_points && !sources.empty() ? sources[e] : Sources{};
+    if (from_points && own.x.empty()) {
       let_out_[e] = until;
       continue;
     }
     for (std::uint64_t k = let_out_[e]; k < until; ++k) {
-      const Newborn p = emitters_[e].particle(k, sources, source_velocities);
+      if (own.share < 1 && random_uniform(emitters_[e].options().seed, kThinning, k) >= own.share) continue;
+      const Newborn p = emitters_[e].particle(k, own.x, own.v);
       x_.push_back(p.x);
       v_.push_back(p.v);
       born_.push_back(p.born);
@@ -69,11 +75,24 @@ void ParticleCloud::step(Real dt, std::span<const Vec3> sources, std::span<const
   dead_.assign(size(), kAlive);
   parallel_ranges(size(), kGrain, [&](std::size_t begin, std::size_t stop) { advance(begin, stop, dt); });
   time_ = end;
-  if (move_)
-    move_(x_, dx_, v_);
-  else
-    parallel_for(size(), [&](std::size_t i) { x_[i] += dx_[i]; }, kGrain);
-  if (contacts_) meet_solids(0);
+  // Those that lie are asked for nothing.
+  moving_.clear();
+  for (std::size_t i = 0; i < size(); ++i)
+    if (!stuck_[i]) moving_.push_back(static_cast<Index>(i));
+  if (move_) {
+    const auto gather = [&](const std::vector<Vec3>& from, std::vector<Vec3>& to) {
+      to.resize(moving_.size());
+      parallel_for(moving_.size(), [&](std::size_t q) { to[q] = from[moving_[q]]; }, kGrain);
+    };
+    gather(x_, moved_x_);
+    gather(dx_, moved_dx_);
+    gather(v_, moved_v_);
+    move_(moved_x_, moved_dx_, moved_v_);
+    parallel_for(moving_.size(), [&](std::size_t q) { x_[moving_[q]] = moved_x_[q], v_[moving_[q]] = moved_v_[q]; }, kGrain);
+  } else {
+    parallel_for(moving_.size(), [&](std::size_t q) { x_[moving_[q]] += dx_[moving_[q]]; }, kGrain);
+  }
+  if (contacts_) meet_solids();
   parallel_for(size(), [&](std::size_t i) {
     if (time_ - born_[i] >= lifetime_[i]) dead_[i] = kAged;
     if (options_.room && !options_.room->contains(x_[i])) dead_[i] = kLeft;
@@ -143,16 +162,18 @@ void ParticleCloud::advance(std::size_t begin, std::size_t end, Real dt) {
 }
 
 /// Those that ended inside a solid, or nearer than their radius, are set on its surface.
-void ParticleCloud::meet_solids(std::size_t first) {
+void ParticleCloud::meet_solids() {
   ZONE("particles.contacts");
-  const std::size_t n = size() - first;
-  const Real reach = parallel_max(n, 0.0, [&](std::size_t i) { return size_[first + i]; });
+  const std::size_t n = moving_.size();
+  const Real reach = parallel_max(n, 0.0, [&](std::size_t q) { return size_[moving_[q]]; });
   found_.resize(n);
-  contacts_(std::span<const Vec3>(x_).subspan(first), reach, found_);
+  moved_x_.resize(n);
+  parallel_for(n, [&](std::size_t q) { moved_x_[q] = x_[moving_[q]]; }, kGrain);
+  contacts_(moved_x_, reach, found_);
   parallel_for(n, [&](std::size_t q) {
-    const std::size_t i = first + q;
+    const std::size_t i = moving_[q];
     const geometry::Contact& c = found_[q];
-    if (stuck_[i] || !c.any() || c.distance >= size_[i]) return;
+    if (!c.any() || c.distance >= size_[i]) return;
     x_[i] += (size_[i] - c.distance) * c.normal;
     if (options_.on_contact == OnContact::kDie) {
       dead_[i] = kFallen;
@@ -216,7 +237,7 @@ void ParticleCloud::add_to(StateHash& hash) const {
 std::size_t ParticleCloud::memory() const {
   return (x_.capacity() + v_.capacity() + dx_.capacity()) * sizeof(Vec3) +
          (born_.capacity() + lifetime_.capacity() + size_.capacity() + temperature_.capacity()) * sizeof(Real) + id_.capacity() * sizeof(std::uint64_t) +
-         stuck_.capacity() + dead_.capacity() + found_.capacity() * sizeof(geometry::Contact);
+         (moved_x_.capacity() + moved_dx_.capacity() + moved_v_.capacity()) * sizeof(Vec3) + moving_.capacity() * sizeof(Index) + stuck_.capacity() + dead_.capacity() + found_.capacity() * sizeof(geometry::Contact);
 }
 
 }  // namespace effuse::flow::particles

@@ -58,9 +58,14 @@ class ParticleCloud {
   using Move = std::function<void(std::span<Vec3> x, std::span<const Vec3> dx, std::span<Vec3> v)>;
   explicit ParticleCloud(const CloudOptions& options, std::vector<EmitterOptions> emitters, Contacts contacts = {}, Move move = {});
 
-  /// Births, motion, contacts and deaths of [time, time + dt], dt > 0. sources, source_velocities: of emitters of kPoints, which
-  /// rest while there are none.
-  void step(Real dt, std::span<const Vec3> sources = {}, std::span<const Vec3> source_velocities = {});
+  /// What an emitter of kPoints is born from in a step: points and their velocities, of equal number; without any it rests.
+  /// share: of its births that take place, 0..1, which ones being a function of their numbers.
+  struct Sources {
+    std::span<const Vec3> x, v;
+    Real share = 1;
+  };
+  /// Births, motion, contacts and deaths of [time, time + dt], dt > 0. sources: one an emitter, read of those of kPoints; or none.
+  void step(Real dt, std::span<const Sources> sources = {});
 
   Real time() const { return time_; }
   std::size_t size() const { return x_.size(); }
@@ -86,7 +91,7 @@ class ParticleCloud {
 
  private:
   void advance(std::size_t begin, std::size_t end, Real dt);
-  void meet_solids(std::size_t first);
+  void meet_solids();
   template <class Self, class Archive>
   static void arrays(Self& self, Archive& io);
 
@@ -101,6 +106,9 @@ class ParticleCloud {
   std::vector<Real> born_, lifetime_, size_, temperature_;
   std::vector<std::uint64_t> id_;
   std::vector<std::uint8_t> stuck_, dead_;
+  // Of a step: those that do not lie, and theirs.
+  std::vector<Index> moving_;
+  std::vector<Vec3> moved_x_, moved_dx_, moved_v_;
   std::vector<geometry::Contact> found_;
 };
 

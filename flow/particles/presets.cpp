@@ -4,13 +4,22 @@ namespace effuse::flow::particles {
 
 namespace {
 
-Preset make(std::string name, std::string what, Forces forces, EmitterOptions emitter, bool volume) {
+struct Seen {
+  bool volume, glows;
+  Vec3 color;
+  Real opacity;
+};
+
+Preset make(std::string name, std::string what, Forces forces, EmitterOptions emitter, const Seen& seen) {
   Preset p;
+  p.volume = seen.volume;
+  p.glows = seen.glows;
+  p.color = seen.color;
+  p.opacity = seen.opacity;
   p.name = std::move(name);
   p.what = std::move(what);
   p.cloud.forces = std::move(forces);
   p.emitter = std::move(emitter);
-  p.volume = volume;
   return p;
 }
 
@@ -28,7 +37,7 @@ std::vector<Preset> make_presets() {
   e.size = 0.003;
   e.size_spread = 0.3;
   e.temperature = 270;
-  all.push_back(make("snow", "flakes that drift and lie where they land", f, e, false));
+  all.push_back(make("snow", "flakes that drift and lie where they land", f, e, {false, false, Vec3(0.95, 0.96, 0.98), 1}));
   all.back().cloud.on_contact = OnContact::kStick;
 
   f = {};
@@ -42,7 +51,7 @@ std::vector<Preset> make_presets() {
   e.lifetime_spread = 0.3;
   e.size = 0.05;
   e.size_spread = 0.3;
-  all.push_back(make("dust", "hangs in the air and goes with it", f, e, true));
+  all.push_back(make("dust", "hangs in the air and goes with it", f, e, {true, false, Vec3(0.62, 0.54, 0.44), 0.12}));
   all.back().cloud.growth = 0.1;
 
   f = {};
@@ -52,7 +61,7 @@ std::vector<Preset> make_presets() {
   e.spread = 0.2;
   e.size = 0.0005;
   e.size_spread = 0.2;
-  all.push_back(make("sand", "grains that fall, bounce little and come to rest", f, e, false));
+  all.push_back(make("sand", "grains that fall, bounce little and come to rest", f, e, {false, false, Vec3(0.80, 0.68, 0.46), 1}));
   all.back().cloud.restitution = 0.1;
   all.back().cloud.friction = 0.6;
 
@@ -68,7 +77,7 @@ std::vector<Preset> make_presets() {
   e.size_spread = 0.4;
   e.temperature = 1350;
   e.temperature_spread = 0.03;
-  all.push_back(make("sparks", "glowing clots thrown from a vent, cooling as they fly", f, e, false));
+  all.push_back(make("sparks", "glowing clots thrown from a vent, cooling as they fly", f, e, {false, true, Vec3(0.2, 0.17, 0.15), 1}));
   all.back().cloud.cooling = 4;
 
   f = {};
@@ -79,13 +88,13 @@ std::vector<Preset> make_presets() {
   e = {};
   e.speed = 0.5;
   e.spread = 0.5;
-  e.lifetime = 1.2;
+  e.lifetime = 1.4;
   e.lifetime_spread = 0.3;
-  e.size = 0.15;
+  e.size = 0.12;
   e.size_spread = 0.3;
   e.temperature = 1500;
-  all.push_back(make("fire", "tongues that rise, cool and go out", f, e, true));
-  all.back().cloud.cooling = 0.8;
+  all.push_back(make("fire", "tongues that rise, cool and go out", f, e, {true, true, Vec3(0.1, 0.1, 0.1), 0.22}));
+  all.back().cloud.cooling = 1.8;
 
   f = {};
   f.response = 0.3;
@@ -100,7 +109,7 @@ std::vector<Preset> make_presets() {
   e.size = 0.3;
   e.size_spread = 0.3;
   e.temperature = 500;
-  all.push_back(make("smoke", "rises, spreads and thins", f, e, true));
+  all.push_back(make("smoke", "rises, spreads and thins", f, e, {true, false, Vec3(0.33, 0.31, 0.3), 0.35}));
   all.back().cloud.growth = 0.3;
   all.back().cloud.cooling = 3;
 
@@ -117,7 +126,7 @@ std::vector<Preset> make_presets() {
   e.size = 0.2;
   e.size_spread = 0.3;
   e.temperature = 373;
-  all.push_back(make("steam", "white puffs where lava meets water, soon gone", f, e, true));
+  all.push_back(make("steam", "white puffs where lava meets water, soon gone", f, e, {true, false, Vec3(0.95, 0.96, 0.97), 0.3}));
   all.back().cloud.growth = 0.6;
   all.back().cloud.cooling = 2;
   return all;

@@ -14,6 +14,9 @@ struct Preset {
   CloudOptions cloud;
   EmitterOptions emitter;
   bool volume = false;  ///< best seen as a density, not as points
+  bool glows = false;   ///< best seen by its own light
+  Vec3 color = Vec3(0.9, 0.9, 0.9);  ///< sRGB
+  Real opacity = 1;     ///< through the middle of one as it is born
 };
 
 /// snow, dust, sand, sparks, fire, smoke, steam. Response times are those of spheres in air at rest (Stokes, or the terminal speed

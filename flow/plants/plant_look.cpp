@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "geometry/base/random.h"
+#include "geometry/mesh/measure.h"
 
 namespace effuse::flow::plants {
 
@@ -148,6 +149,7 @@ TriMesh flames_of(const Plant& grown, const Standing& standing, const PlantFire&
         mesh.triangles.push_back({vertex(j, q), vertex(j + 1, q + 1), vertex(j + 1, q)});
       }
   }
+  geometry::compute_normals(mesh);
   mesh.attributes["color"] = std::move(color);
   mesh.attributes["glow"] = std::move(glow);
   return mesh;

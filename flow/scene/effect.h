@@ -2,18 +2,21 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
 #include "flow/scene/joints.h"
+#include "flow/scene/meeting.h"
 #include "flow/scene/obstacles.h"
 #include "flow/scene/parameters.h"
 #include "flow/scene/rigid_bodies.h"
 #include "geometry/base/hash.h"
 #include "geometry/base/state_io.h"
 #include "geometry/mesh/points.h"
+#include "geometry/mesh/volume.h"
 #include "geometry/terrain/terrain.h"
 
 namespace effuse::flow {
@@ -37,10 +40,37 @@ struct NamedMesh {
   Real since = -1;  ///< it has been the same, bit for bit, from this time on [s]; negative: it may have changed just now
 };
 
+/// Particles of one moment that are drawn one by one.
+///   radius, temperature, age, opacity  one a particle [m], [K], [s], 0..1 through its middle
+///   color  linear light of what they are made of
+struct NamedCloud {
+  enum class Look {
+    kGrains,  ///< flakes and grains: opaque specks
+    kGlow,    ///< they shine as hot as they are
+    kPuffs    ///< soft balls, one behind the other
+  };
+  std::string name;
+  Look look = Look::kGrains;
+  std::vector<Vec3> x, v;
+  std::vector<Real> radius, temperature, age, opacity;
+  std::vector<std::uint64_t> id;
+  Vec3 color = Vec3::Ones();
+  bool soft = false;  ///< kGlow: flames that one sees through, not clots
+  bool points = true, spheres = false;  ///< files: frames/NAME.####.ply of points, or of small spheres
+
+  geometry::Points view() const {
+    geometry::Points p;
+    p.position = x, p.velocity = v, p.radius = radius, p.temperature = temperature, p.age = age, p.id = id;
+    return p;
+  }
+};
+
 /// What an effect is expected to cost: for `effuse check`.
 struct Estimate {
   double particles = 0;  ///< at the end
   double mean_particles = 0;  ///< over the film
+  double drawn = 0;      ///< particles that are drawn one by one, at the end; no part of those above
+  double cells = 0;      ///< of grids
   double bytes = 0;      ///< of memory, at the end
   double steps = 0;      ///< in all, at the largest stable size
   double seconds = 0;    ///< of two cores; a rough figure
@@ -81,13 +111,26 @@ class Effect {
   /// Whether there ever may be pieces that belong to no body of the scene.
   virtual bool makes_pieces() const { return false; }
 
-  /// Once, when all effects of the scene are built; they outlive this one's steps. Of another effect it sees the last moment that
-  /// it reached: those before it in the scene's order are at the end of the frame, those behind it at its beginning.
-  virtual void meet(const std::vector<Effect*>& others) { static_cast<void>(others); }
   /// Where it burns: middles and half heights of flames, their temperature, and the speed of what rises.
   virtual geometry::Points fires() const { return {}; }
   /// Surfaces of its own; their names do not change through a run.
   virtual std::vector<NamedMesh> meshes() const { return {}; }
+  /// Particles to draw, not to skin, for files (frames/NAME.####.ply) and pictures. Names do not change through a run.
+  virtual std::vector<NamedCloud> clouds() const { return {}; }
+  /// Fields for files (frames/NAME.####.vdb); in pictures where draws_volumes(), of that colour (linear light).
+  virtual std::vector<geometry::GridVolume> volumes() const { return {}; }
+  virtual std::optional<Vec3> draws_volumes() const { return std::nullopt; }
+
+  /// Once, when all effects of the scene are built; they outlive this one's steps. Of another effect it sees the last moment that
+  /// it reached: those before it in the scene's order are at the end of the frame, those behind it at its beginning.
+  virtual void meet(const std::vector<Effect*>& others) { static_cast<void>(others); }
+  /// What others meet: its particles, where they come out, its water.
+  virtual FlowView flow() const { return {}; }
+  virtual std::vector<Opening> openings() const { return {}; }
+  virtual const Water* water() const { return nullptr; }
+  /// What it chose by itself, a line each: for `effuse check`.
+  virtual std::vector<std::string> remarks() const { return {}; }
+
   virtual std::size_t memory() const = 0;  ///< bytes held
   virtual void add_to(StateHash& hash) const = 0;
   virtual void save(StateWriter& out) const = 0;
@@ -101,6 +144,8 @@ class Effect {
 /// An effect as a scene describes it, not yet built.
 struct EffectPlan {
   std::string name;
+  std::string kind;  ///< name of its table; read_scene() says it
+  std::vector<Partner> partners;  ///< other effects that the scene must have
   Estimate estimate;
   /// What does not fit the world (a vent beside the terrain); may be asked of a plan whose table has faults.
   std::function<std::vector<Fault>(const World&)> misfits;

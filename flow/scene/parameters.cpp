@@ -188,6 +188,8 @@ void Parameters::fault(const std::string& key, const std::string& message) {
   shared_->faults.push_back({place(key), name.empty() ? message : name + ": " + message});
 }
 
+void Parameters::fault_at(const Place& place, const std::string& message) { shared_->faults.push_back({place, message}); }
+
 Real Parameters::number(const std::string& key, std::string_view unit, std::optional<Real> fallback, Range range, std::string_view what) {
   Table::Entry& entry = table_->entry(key);
   shared_->document(joined(table_->doc_path, key), plain(unit) ? "" : std::string(unit),

@@ -70,6 +70,8 @@ class Parameters {
 
   /// A fault at the value of key (or at the table when absent).
   void fault(const std::string& key, const std::string& message);
+  /// A fault that was found later, of something whose place and name are known.
+  void fault_at(const Place& place, const std::string& message);
   Place place(const std::string& key) const;
   const std::string& path() const { return path_; }
 

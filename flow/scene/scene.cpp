@@ -16,6 +16,24 @@ Estimate estimate_bodies(const BodySettings& settings, std::size_t bodies, Real 
   e.bytes = 5e3 * static_cast<Real>(bodies);
   return e;
 }
+
+/// A fault for each partner of an effect that the scene does not have.
+void require_partners(Parameters& root, const std::vector<EffectPlan>& effects) {
+  for (const EffectPlan& plan : effects)
+    for (const Partner& partner : plan.partners) {
+      std::vector<std::string> fitting;
+      for (const EffectPlan& other : effects)
+        if (std::find(partner.kinds.begin(), partner.kinds.end(), other.kind) != partner.kinds.end()) fitting.push_back(other.name);
+      if (partner.name.empty() ? !fitting.empty() : std::find(fitting.begin(), fitting.end(), partner.name) != fitting.end()) continue;
+      std::string kinds;
+      for (const std::string& kind : partner.kinds) kinds += (kinds.empty() ? "[" : " or [") + kind + "]";
+      if (partner.name.empty()) root.fault_at(partner.place, fmt::format("{}: {}, and the scene has no {}", partner.path, partner.what, kinds));
+      else {
+        const std::string near = nearest_name(partner.name, fitting);
+        root.fault_at(partner.place, fmt::format("{}: names '{}', no {} of the scene{}", partner.path, partner.name, kinds, near.empty() ? "" : fmt::format(" (did you mean {}?)", near)));
+      }
+    }
+}
 }  // namespace
 
 Scene read_scene(Parameters& root, std::span<const EffectKind> kinds) {
@@ -46,10 +64,12 @@ Scene read_scene(Parameters& root, std::span<const EffectKind> kinds) {
     if (!kind.many) {
       Parameters table = root.table(kind.name, kind.what);
       scene.effects.push_back(kind.read(table, scene.frame_time(scene.frames)));
+      scene.effects.back().kind = kind.name;
       continue;
     }
     for (Parameters& table : root.tables(kind.name, kind.what)) {
       EffectPlan plan = kind.read(table, scene.frame_time(scene.frames));
+      plan.kind = kind.name;
       if (std::any_of(scene.effects.begin(), scene.effects.end(), [&](const EffectPlan& other) { return other.name == plan.name; }))
         table.fault("name", fmt::format("'{}' is the name of another effect, wanted one of its own: files are called by it", plan.name));
       scene.effects.push_back(std::move(plan));
@@ -61,9 +81,11 @@ Scene read_scene(Parameters& root, std::span<const EffectKind> kinds) {
     for (const EffectKind& kind : kinds) {
       if (!kind.of_solids) continue;
       scene.effects.push_back(kind.read(told, scene.frame_time(scene.frames)));
+      scene.effects.back().kind = kind.name;
       scene.effects.back().estimate = estimate_bodies(scene.body_settings, scene.bodies.size(), scene.frame_time(scene.frames));
     }
   }
+  require_partners(root, scene.effects);
   if (scene.effects.empty()) {
     std::string names;
     for (const EffectKind& kind : kinds) names += (names.empty() ? "[" : ", [") + (kind.of_solids ? "[body]" : kind.name) + "]";

@@ -29,18 +29,20 @@ struct SurfaceLaw {
   Real face_temperature(Real T, Real G, Real share) const;
 };
 
-inline constexpr int kColumnCells = 16;
+inline constexpr int kColumnCells = 16;  ///< at most
 
-/// Shares of a column's depth, from the surface down: a geometric series that begins with `finest` and sums to 1.
+/// Shares of a column's depth, from the surface down: a geometric series that begins with `finest`, at most 1 / cells, and sums to 1.
 struct ColumnShape {
-  explicit ColumnShape(Real finest = 1.0 / 200);
-  std::array<Real, kColumnCells> share;
+  /// finest in (0, 1], cells from 2 to kColumnCells (checked).
+  explicit ColumnShape(Real finest = 1.0 / 200, int cells = kColumnCells);
+  int cells;
+  std::array<Real, kColumnCells> share;   ///< 0 beyond cells
   std::array<Real, kColumnCells> centre;  ///< depth of a cell's middle, share of the whole
 };
 
 /// Heat of one exposed particle, by depth.
 struct CrustColumn {
-  std::array<Real, kColumnCells> H;  ///< enthalpies [J/kg], from the surface down
+  std::array<Real, kColumnCells> H;  ///< enthalpies [J/kg], from the surface down; those beyond the shape's cells are not used
   Real surface_temperature = 0;      ///< [K]
   Real depth = 0;                    ///< [m]
   Real age = 0;                      ///< exposed for so long [s]

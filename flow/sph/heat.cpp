@@ -15,7 +15,6 @@ namespace effuse::flow::sph {
 
 namespace {
 constexpr std::string_view kModel = "heat 2";  // of a checkpoint: changes with what is saved
-constexpr int kLast = kColumnCells - 1;
 constexpr Real kFinestShare = 1.0 / 200;       // of a column's depth: its first cell
 constexpr Real kFinestCell = 2e-3;             // [m], at most
 constexpr Real kColumnStep = 0.1;              // of a column's age: its implicit step, the flux then errs by 1 %
@@ -72,6 +71,7 @@ Real column_factor(const Kernel& W, Real spacing, Real last_share) {
 HeatBudget operator+(HeatBudget a, const HeatBudget& b) {
   a.radiated += b.radiated;
   a.convected += b.convected;
+  a.quenched += b.quenched;
   a.ground += b.ground;
   a.dissipated += b.dissipated;
   return a;
@@ -82,7 +82,7 @@ Real at(std::span<const Real> values, std::size_t i) { return values.empty() ? 0
 
 Heat::Heat(const HeatOptions& options, Real spacing, Real density)
     : options_(options), spacing_(spacing), density_(density), mass_(density * spacing * spacing * spacing), interval_(0), diffusion_time_(0),
-      shape_(std::min(kFinestShare, kFinestCell / spacing)) {
+      shape_(std::min(kFinestShare, kFinestCell / spacing), options.crust_cells) {
   CHECK_GT(spacing, 0.0);
   CHECK_GT(density, 0.0);
   CHECK_GT(options.conductivity, 0.0);
@@ -154,6 +154,7 @@ HeatBudget Heat::step(Real dt, const Surroundings& s) {
   CHECK(s.ground_area.empty() || s.ground_temperature.size() == n);
   CHECK(s.ground_effusivity.empty() || s.ground_effusivity.size() == n);
   CHECK(s.dissipation.empty() || s.dissipation.size() == n);
+  CHECK(s.wet.empty() || s.wet.size() == n);
 
   raise_columns(s);
 
@@ -179,7 +180,7 @@ HeatBudget Heat::step(Real dt, const Surroundings& s) {
     CHECK_GT(s.support, 0.0);
     // The longest monotone step is kMonotone / rate; s stages are as good as (s^2 + s) / 2 of those.
     load_nodes();
-    const Real wanted = pair_time_ * exchange(s) / kMonotone;
+    const Real rate = exchange(s), wanted = options_.guards.monotone_conduction ? pair_time_ * rate / kMonotone : 0;
     // Surfaces and pairs take turns: in a long step, more often.
     const Real turns = std::min(kMostTurns, pair_time_ / (kTurn * diffusion_time_));
     const Real super_steps = std::max(1.0, std::ceil(std::max(turns, wanted / (kMostStages * (kMostStages + 1) / 2))));
@@ -248,7 +249,7 @@ void Heat::drop_columns() {
 
 void Heat::load_nodes() {
   node_.resize(size());
-  parallel_for(size(), [&](std::size_t i) { node_[i] = column_of_[i] == kNone ? enthalpy_[i] : columns_[column_of_[i]].H[kLast]; }, 4096);
+  parallel_for(size(), [&](std::size_t i) { node_[i] = column_of_[i] == kNone ? enthalpy_[i] : columns_[column_of_[i]].H[last_cell()]; }, 4096);
 }
 
 void Heat::store_nodes() {
@@ -258,8 +259,8 @@ void Heat::store_nodes() {
       enthalpy_[i] = node_[i];
       return;
     }
-    enthalpy_[i] += (node_[i] - columns_[c].H[kLast]) * shape_.share[kLast];
-    columns_[c].H[kLast] = node_[i];
+    enthalpy_[i] += (node_[i] - columns_[c].H[last_cell()]) * shape_.share[last_cell()];
+    columns_[c].H[last_cell()] = node_[i];
   }, 4096);
 }
 
@@ -296,7 +297,7 @@ Real Heat::exchange(const Surroundings& s, const Kernel& W) {
     packed_[i] = {s.x[i].x(), s.x[i].y(), s.x[i].z(), options_.curve.temperature(node_[i]), conductivity(node_[i]), column_of_[i] == kNone ? 0.0 : 1.0};
   }, 4096);
 
-  const Real alpha = column_factor(W, spacing_, shape_.share[kLast]);
+  const Real alpha = column_factor(W, spacing_, shape_.share[last_cell()]);
   const Real volume = mass_ / density_, scale = volume * volume / mass_;
   const Vec2 L = s.period;
   const auto nearest = [](Real d, Real period) { return d > period / 2 ? d - period : d < -period / 2 ? d + period : d; };
@@ -321,7 +322,7 @@ Real Heat::exchange(const Surroundings& s, const Kernel& W) {
         conductance += w;
       }
       // The last cell of a column takes it all.
-      const Real per_mass = scale / (p.column > 0 ? shape_.share[kLast] : 1);
+      const Real per_mass = scale / (p.column > 0 ? shape_.share[last_cell()] : 1);
       gain_[i] = per_mass * gain;
       rate_[i] = per_mass * conductance / options_.curve.heat_capacity;
     });
@@ -378,7 +379,7 @@ HeatBudget Heat::lose_column(std::size_t c, Real dt, const Surroundings& s, bool
   const bool turned = (sky > 0) == (column.buried > 0);
   column.buried = sky > 0 ? 0 : column.buried + dt;
   const Real area = at(s.ground_area, i);
-  column.pending_ground += dt * ground_conductance(i, dt, area, shape_.share[kLast] * column.depth, column.H[kLast], at(s.ground_temperature, i), at(s.ground_effusivity, i));
+  column.pending_ground += dt * ground_conductance(i, dt, area, shape_.share[last_cell()] * column.depth, column.H[last_cell()], at(s.ground_temperature, i), at(s.ground_effusivity, i));
   if (area > 0) column.ground_temperature = s.ground_temperature[i];
 
   const Real k = std::max(options_.conductivity, options_.solid_conductivity);
@@ -397,17 +398,18 @@ HeatBudget Heat::lose_column(std::size_t c, Real dt, const Surroundings& s, bool
     Real h = exposed > 0 ? kColumnStep * (column.age + beginning) : left;
     if (h > 0.999 * left) h = left;
     const ColumnLoss loss = step_column(column.H, h, column.depth, density_, shape_, options_.curve, options_.conductivity, options_.solid_conductivity,
-                                        options_.air, ends, column.surface_temperature);
+                                        law_of(i, s), ends, column.surface_temperature);
     budget.radiated += cross * loss.radiated;
     budget.convected += cross * loss.convected;
     budget.ground += cross * loss.ground;
     if (exposed > 0) column.age += h;
     left -= h;
   }
+  if (!s.wet.empty() && s.wet[i]) budget.quenched = budget.radiated + budget.convected;
   given_[i] += budget.ground;
   column.pending = column.pending_sky = column.pending_ground = 0;
   Real mean = 0;
-  for (int j = 0; j < kColumnCells; ++j) mean += shape_.share[j] * column.H[j];
+  for (int j = 0; j < shape_.cells; ++j) mean += shape_.share[j] * column.H[j];
   enthalpy_[i] = mean;
   refresh_particle(i);
   return budget;
@@ -419,7 +421,7 @@ HeatBudget Heat::lose_lump(std::size_t i, Real dt, const Surroundings& s) {
   const Real ground_T = area > 0 ? s.ground_temperature[i] : 0;
   if (sky <= 0 && G <= 0) return {};
   const EnthalpyCurve& curve = options_.curve;
-  const SurfaceLaw& air = options_.air;
+  const SurfaceLaw& air = law_of(i, s);
 
   const Real fastest = (sky * air.slope(curve.temperature(enthalpy_[i])) + G) / (mass_ * curve.heat_capacity);
   const int steps = static_cast<int>(std::clamp(std::ceil(dt * fastest / kLumpStep), 1.0, Real(kMaxLumpSteps)));
@@ -458,6 +460,7 @@ HeatBudget Heat::lose_lump(std::size_t i, Real dt, const Surroundings& s) {
     budget.ground += h * ground + (sky > 0 ? 0 : rest);
     enthalpy_[i] = H;
   }
+  if (!s.wet.empty() && s.wet[i]) budget.quenched = budget.radiated + budget.convected;
   given_[i] += budget.ground;
   refresh_particle(i);
   return budget;
@@ -479,7 +482,7 @@ void Heat::refresh_particle(std::size_t i) {
   }
   const CrustColumn& column = columns_[c];
   Real solid = 0;
-  for (int j = 0; j < kColumnCells; ++j) solid += shape_.share[j] * curve.solid_fraction(column.H[j]);
+  for (int j = 0; j < shape_.cells; ++j) solid += shape_.share[j] * curve.solid_fraction(column.H[j]);
   solid_fraction_[i] = solid;
   surface_temperature_[i] = column.buried > 0 ? temperature_[i] : column.surface_temperature;
   const Real depth = crust_depth(column, shape_, curve, options_.crust_temperature);
@@ -497,7 +500,7 @@ std::vector<Heat::Level> Heat::profile(std::size_t i) const {
   if (column_of_[i] == kNone) return levels;
   const CrustColumn& column = columns_[column_of_[i]];
   levels.push_back({0, column.surface_temperature});
-  for (int j = 0; j < kColumnCells; ++j) levels.push_back({shape_.centre[j] * column.depth, options_.curve.temperature(column.H[j])});
+  for (int j = 0; j < shape_.cells; ++j) levels.push_back({shape_.centre[j] * column.depth, options_.curve.temperature(column.H[j])});
   return levels;
 }
 

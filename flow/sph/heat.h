@@ -6,6 +6,7 @@
 #include "flow/sph/column_grid.h"
 #include "flow/sph/crust_column.h"
 #include "flow/sph/enthalpy.h"
+#include "flow/sph/guards.h"
 #include "flow/sph/kernel.h"
 #include "geometry/base/hash.h"
 #include "geometry/base/state_io.h"
@@ -23,14 +24,17 @@ struct HeatOptions {
   Real ground_conductance = 0;    ///< [W/(m^2 K)] instead of a half-space: a plate with its far side at the ground temperature. 0: half-space
   bool viscous_heating = true;    ///< use Surroundings::dissipation
   bool crust = true;              ///< a conductive column on each exposed particle; false: it glows with its mean temperature
+  int crust_cells = kColumnCells; ///< of that column, 2 to 16
   Real crust_temperature = 1070 + kZeroCelsius;  ///< crust is what is colder [K]
   Real longest_interval = 60;     ///< [s] between two exchanges among particles, see Heat::conducts()
+  Guards guards;             ///< all on, but for tests
 };
 
 /// Joules, of one step. Enthalpy gained = dissipated - radiated - convected - ground, to rounding.
 struct HeatBudget {
   Real radiated = 0, convected = 0;  ///< through exposed faces
   Real ground = 0;                   ///< into the ground
+  Real quenched = 0;                 ///< of radiated and convected: into water
   Real dissipated = 0;               ///< by viscous heating, gained
   int conduction_passes = 0;         ///< loops over all pairs
 };
@@ -44,7 +48,7 @@ struct HeatBudget {
 /// properties (Meyer, Balsara & Aslam 2014, J. Comput. Phys. 257, 594-626). Exchange and losses take turns, of 0.05
 /// dx^2/kappa each, though not more than eight in a step unless the stages would grow beyond 51.
 ///
-/// An exposed particle (sky_area > 0) holds, in place of its one value, a CrustColumn: 16 cells from the surface to the
+/// An exposed particle (sky_area > 0) holds, in place of its one value, a CrustColumn: crust_cells cells from the surface to the
 /// particle's depth, whose sum IS its enthalpy. Losses leave by the first cell, implicitly in the surface temperature;
 /// neighbours exchange with the last one, which stands nearer to them than a particle's centre. Such pairs (one has a
 /// column, the other not) take their weight at 1.5 times their distance, so that the first layer below dominates, and
@@ -95,6 +99,9 @@ class Heat {
     std::span<const Real> ground_temperature;  ///< of the undisturbed ground [K]; read where ground_area > 0
     std::span<const Real> dissipation;   ///< [W/m^3], >= 0; or empty
     std::span<const Real> ground_effusivity = {};  ///< b of what it touches there [J/(m^2 K s^0.5)]; 0, or empty: the options' ground
+    std::span<const std::uint8_t> wet = {};    ///< 1: its exposed face is under water, whose law holds in place of the air's; or empty. What an old crust
+                                               ///< has pending as it gets wet is lost by water's law, too
+    SurfaceLaw water = {};                     ///< air_temperature: the water's
   };
   /// Whether step(dt) will loop over the pairs. If not, neighbors may be of any size and age.
   bool conducts(Real dt) const { return options_.on && pair_time_ + dt >= interval_; }
@@ -156,6 +163,8 @@ class Heat {
   void refresh();
   void refresh_particle(std::size_t i);
   Real conductivity(Real enthalpy) const;
+  std::size_t last_cell() const { return static_cast<std::size_t>(shape_.cells - 1); }
+  const SurfaceLaw& law_of(std::size_t i, const Surroundings& s) const { return !s.wet.empty() && s.wet[i] ? s.water : options_.air; }
 
   HeatOptions options_;
   Real spacing_, density_, mass_, interval_, diffusion_time_;

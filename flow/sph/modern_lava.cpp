@@ -104,6 +104,8 @@ struct ModernLava::Impl {
   ViscositySolver viscosity;
   PressureSolver pressure;
   std::vector<Vec3> before_x;
+  WaterSource water;
+  std::vector<std::uint8_t> wet;
   // What points() shows.
   mutable std::vector<Real> radius, crust, age, p;
 
@@ -202,6 +204,7 @@ struct ModernLava::Impl {
     io.value("rested", self.rested);
     io.value("taken", self.taken);
     io.value("left_enthalpy", self.left_enthalpy);
+    io.value("owed_quenched", self.owed.quenched);
     io.value("owed_radiated", self.owed.radiated);
     io.value("owed_convected", self.owed.convected);
     io.value("owed_ground", self.owed.ground);
@@ -300,6 +303,22 @@ struct ModernLava::Impl {
     if (o.period.isZero()) solids.part(lx, walls, neighbors);
   }
 
+  /// "; particle 17 at (1, 2, 3) has a velocity that is no number": the first whose state went bad, or the fastest of the last try.
+  std::string worst_particle(Real dt) const {
+    std::size_t worst = 0;
+    Real most = -1;
+    for (std::size_t k = 0; k < set.awake; ++k) {
+      const Index i = set.particles[k];
+      const char* bad = !x[i].allFinite() ? "position" : !start[k].allFinite() ? "velocity" : !std::isfinite(q[i]) ? "pressure" : !std::isfinite(mu[i]) ? "viscosity" : nullptr;
+      if (bad) return fmt::format("; particle {} at ({:.6g}, {:.6g}, {:.6g}) has a {} that is no number", census.ids()[i], x[i].x(), x[i].y(), x[i].z(), bad);
+      const Real path = (dt * lv[k]).norm();
+      if (path > most) most = path, worst = k;
+    }
+    if (most < 0) return "";
+    const Index i = set.particles[worst];
+    return fmt::format("; particle {} at ({:.6g}, {:.6g}, {:.6g}) would go {:.3g} spacings", census.ids()[i], x[i].x(), x[i].y(), x[i].z(), most / o.spacing);
+  }
+
   /// Everything that depends on positions alone.
   void look_around() {
     if (set.particles.empty()) return;
@@ -382,11 +401,11 @@ struct ModernLava::Impl {
       pressure_acceleration(s, lq, predicted);
       push_movables(s, lq, predicted, dt);
       parallel_for(m, [&](std::size_t k) { predicted[k] = s.is_fixed(k) ? start[k] : Vec3(start[k] + dt * (predicted[k] + o.gravity)); }, 2048);
-      const ViscosityResult viscous = viscosity.solve(s, o.density, lmu, o.slip_length, dt, predicted, o.viscosity_tolerance, o.max_iterations, lv, scale);
+      const ViscosityResult viscous = !o.guards.implicit_viscosity ? explicit_viscosity(s, dt) : viscosity.solve(s, o.density, lmu, o.slip_length, dt, predicted, o.viscosity_tolerance, o.max_iterations, lv, scale);
       if (o.heat.on && o.heat.viscous_heating) viscous_v = lv;
       report.viscosity_iterations += viscous.iterations;
       report.viscosity_residual = viscous.residual;
-      if (!(viscous.residual < kFailed * o.viscosity_tolerance)) return false;
+      if (!(viscous.residual < kFailed * o.viscosity_tolerance) && o.guards.step_limit) return false;
       const PressureResult pressed = pressure.solve_prepared(s, rate, least, dt, o.divergence_tolerance, o.max_iterations, lv, lq, g > 0 ? tight : o.divergence_tolerance);
       // Lava pressed between what is fixed (a vent's, sleepers) cannot give way in any step: told, not tried again.
       report.solved = viscous.converged && pressed.converged;
@@ -396,7 +415,7 @@ struct ModernLava::Impl {
     // Where density is too large, out of it; nothing else may be compressed by that.
     std::vector<Vec3>& shift = predicted;
     shift.assign(m, Vec3::Zero());
-    if (report.density_error > o.density_tolerance) {
+    if (report.density_error > o.density_tolerance && o.guards.make_room) {
       parallel_for(m, [&](std::size_t k) {
         const Real excess = shape.density[k] - 1;
         rate[k] = excess > 0 ? -kTakeBack * excess : -0.5 * excess;
@@ -414,14 +433,22 @@ struct ModernLava::Impl {
       }, 2048);
     }
     const Real limit = o.spacing / 2;
-    return parallel_max(m, 0, [&](std::size_t k) {
+    return !o.guards.step_limit || parallel_max(m, 0, [&](std::size_t k) {
              const Vec3 path = dt * lv[k] + shift[k];
              return path.squaredNorm() < limit * limit && std::isfinite(lq[k]) ? 0.0 : 1.0;  // not a number: 1
            }) == 0;
   }
 
+  /// The old velocities' forces, in predicted: what viscosity is without its solve.
+  ViscosityResult explicit_viscosity(const ParticleSystem& s, Real dt) {
+    viscous_acceleration(s, o.density, lmu, o.slip_length, start, lv);
+    parallel_for(lv.size(), [&](std::size_t k) { lv[k] = s.is_fixed(k) ? start[k] : Vec3(predicted[k] + dt * lv[k]); }, 2048);
+    return {0, 0, true};
+  }
+
   Real stable_step() const {
     Real dt = o.max_step;
+    if (!o.guards.step_limit) return dt;
     const Real speed = largest_norm(v);
     if (speed > 0) dt = std::min(dt, o.courant * o.spacing / speed);
     if (solid_speed > 0) dt = std::min(dt, o.courant * o.spacing / solid_speed);
@@ -472,6 +499,10 @@ struct ModernLava::Impl {
     // Lists of the step's beginning are good enough for conduction; sleepers have none, and others of their own.
     Neighbors everyone;
     if (heat.conducts(dt) && !all) find_neighbors(x, everyone);
+    if (water.wet) {
+      wet.assign(size(), 0);
+      water.wet(x, wet);
+    }
     report.heat = heat.step(dt, {.x = x,
                                  .neighbors = all ? neighbors : everyone,
                                  .kernel = o.kernel,
@@ -481,7 +512,9 @@ struct ModernLava::Impl {
                                  .ground_area = grounded,
                                  .ground_temperature = ground_T,
                                  .dissipation = all ? std::span<const Real>(scratch) : std::span<const Real>(power),
-                                 .ground_effusivity = solids.any() ? std::span<const Real>(ground_b) : std::span<const Real>()});
+                                 .ground_effusivity = solids.any() ? std::span<const Real>(ground_b) : std::span<const Real>(),
+                                 .wet = water.wet ? std::span<const std::uint8_t>(wet) : std::span<const std::uint8_t>(),
+                                 .water = water.law});
     if (solids.any()) solids.warm(touches, heat.given(), heat.touched_temperature());
   }
 
@@ -542,7 +575,7 @@ struct ModernLava::Impl {
     for (;; ++report.retries, dt /= 2) {
       if (try_step(dt, report)) break;
       if (report.retries == kMaxRetries || dt / 2 < o.min_step)
-        throw UnstableError(fmt::format("the step at t = {:.6g} s stayed unstable down to dt = {:.3g} s ({} particles)", time, dt, size()));
+        throw UnstableError(fmt::format("the step at t = {:.6g} s stayed unstable down to dt = {:.3g} s ({} particles){}", time, dt, size(), worst_particle(dt)));
       emitter.carry(time, dt / 2, v);
       parallel_for(m, [&](std::size_t k) { start[k] = v[set.particles[k]]; }, 2048);
     }
@@ -559,7 +592,7 @@ struct ModernLava::Impl {
     for (std::size_t k = set.awake; k < set.awake + set.drowsy; ++k) q[set.particles[k]] = lq[k];
     acceleration = std::sqrt(parallel_max(set.awake, 0, [&](std::size_t k) { return ((lv[k] - start[k]) / dt).squaredNorm(); }));
     ground.moved(all ? lx : before_x, x, dt * o.ground_speed);
-    ground.project(x, v, [&](std::size_t i) { return !emitter.held(i) && !asleep[i]; });
+    if (o.guards.projection) ground.project(x, v, [&](std::size_t i) { return !emitter.held(i) && !asleep[i]; });
     if (solids.any()) pass_solids(all ? lx : before_x, dt, report);
     fall_asleep(dt);
     wrap();
@@ -573,6 +606,7 @@ struct ModernLava::Impl {
   void pass_solids(std::span<const Vec3> from, Real dt, ModernReport& report) {
     solid_speed = solids.speed();
     solids.go(time, dt);
+    if (!o.guards.projection) return;
     std::vector<Index> which;
     for (std::size_t k = 0; k < set.awake; ++k)
       if (!emitter.held(set.particles[k])) which.push_back(set.particles[k]);
@@ -641,6 +675,7 @@ struct ModernLava::Impl {
   void settle(ModernReport& report) {
     report.heat.radiated += owed.radiated;
     report.heat.convected += owed.convected;
+    report.heat.quenched += owed.quenched;
     report.heat.ground += owed.ground;
     report.heat.dissipated += owed.dissipated;
     owed = {};
@@ -711,6 +746,8 @@ void ModernLava::add(std::span<const Vec3> x, std::span<const Vec3> v, std::span
     m.frames.born(x[i], x[i]);
   }
 }
+
+void ModernLava::set_water(WaterSource water) { impl_->water = std::move(water); }
 
 Real ModernLava::take(std::span<const Index> which) {
   Impl& m = *impl_;

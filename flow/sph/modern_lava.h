@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "flow/sph/ground.h"
+#include "flow/sph/guards.h"
 #include "flow/sph/heat.h"
 #include "flow/sph/kernel.h"
 #include "flow/sph/rheology.h"
@@ -48,6 +49,15 @@ struct ModernOptions {
   Vec2 period = Vec2::Zero();  ///< of x and y [m], positions in [0, period); 0: not periodic. At least two supports.
   Real rest_period = 60;     ///< [s] between two births of one set of material coordinates; 0: never
   std::uint64_t seed = 1;
+  Guards guards;             ///< all on, but for tests
+};
+
+/// Water that lava may run into: what of it is wet exchanges heat with water instead of air. Water neither carries nor moves it.
+///   wet  sets 1 where a point lies under water, in parallel; the others are 0 already
+///   law  of an exposed face under water; air_temperature: the water's
+struct WaterSource {
+  std::function<void(std::span<const Vec3> x, std::span<std::uint8_t> out)> wet;
+  SurfaceLaw law;
 };
 
 /// What one step did.
@@ -111,6 +121,9 @@ class ModernLava {
   /// Takes particles out, rising numbers (checked), for what becomes of them elsewhere. The heat [J] that went with them; they count
   /// neither as present nor as left (mass_taken). Numbers of those behind move up.
   Real take(std::span<const Index> which);
+
+  /// From the next step on; no part of what is saved.
+  void set_water(WaterSource water);
 
   /// One step of at most dt_max [s] > 0. A step whose viscosity solve fails (stays above ten times the tolerance), whose result is not finite,
   /// or which moves a particle by more than half a spacing is undone and tried with half the size, eight times and down to min_step; then

@@ -26,6 +26,7 @@ struct WaveOptions {
   Border border = Border::kMirror;
   WaveScheme scheme = WaveScheme::kExplicit;
   Real tolerance = 1e-8;         ///< of the implicit solve, relative
+  bool guarded = true;           ///< false, for tests alone: explicit steps of any length are taken
 };
 
 /// h_tt + damping h_t = div(c^2 grad h) on nx x ny square cells, five-point differences, second order in space and time.

@@ -38,10 +38,16 @@ struct MeshSurface::Impl {
   std::vector<char> rim, creased;              // vertices on the border; vertices with a sharp edge
   std::vector<Vec3> corner_normal;             // angle-weighted over the triangles reached without crossing a sharp edge
   std::vector<std::array<Index, 3>> corner;    // per triangle: which of them
+  std::vector<Index> around, around_start;     // the triangles at each vertex, rising
   std::unique_ptr<MeshTree> tree;
 
   void link_sides();
   void make_normals();
+  void list_around();
+  /// Of the triangles that share the feature the nearest point lies on, the first of those at the least distance: which one a search meets
+  /// first does not tell.
+  MeshTree::Nearest settled(const Vec3& p, MeshTree::Nearest nearest) const;
+  Contact contact_at(const Vec3& p, const MeshTree::Nearest& nearest) const;
   bool sharp(std::size_t t, int side) const {
     const Index other = across[t][side];
     return other >= kMany || face_normal[t].dot(face_normal[other / 3]) < std::cos(kCreaseAngle);
@@ -153,6 +159,36 @@ void MeshSurface::Impl::make_normals() {
   for (Vec3& n : vertex_normal) n.normalize();
 }
 
+void MeshSurface::Impl::list_around() {
+  around_start.assign(positions.size() + 1, 0);
+  for (const Triangle& t : triangles)
+    for (const Index v : t) ++around_start[v + 1];
+  for (std::size_t v = 0; v < positions.size(); ++v) around_start[v + 1] += around_start[v];
+  around.resize(3 * triangles.size());
+  std::vector<Index> next(around_start.begin(), around_start.end() - 1);
+  for (std::size_t t = 0; t < triangles.size(); ++t)
+    for (const Index v : triangles[t]) around[next[v]++] = static_cast<Index>(t);
+}
+
+MeshTree::Nearest MeshSurface::Impl::settled(const Vec3& p, MeshTree::Nearest nearest) const {
+  // Away from its sides a triangle shares the point with nobody.
+  constexpr Real kAside = 1e-7;
+  const Vec3 weights = nearest.at.weights;
+  if (weights.minCoeff() > kAside) return nearest;
+  Eigen::Index heaviest = 0;
+  weights.maxCoeff(&heaviest);
+  const Index v = triangles[nearest.triangle][static_cast<std::size_t>(heaviest)];
+  for (Index k = around_start[v]; k < around_start[v + 1]; ++k) {
+    const Index t = around[k];
+    if (t == nearest.triangle) continue;
+    const auto& [a, b, c] = triangles[t];
+    const TrianglePoint at = closest_point_on_triangle(p, positions[a], positions[b], positions[c]);
+    const Real distance = (p - at.point).norm();
+    if (distance < nearest.distance || (distance == nearest.distance && t < nearest.triangle)) nearest = {t, at, distance};
+  }
+  return nearest;
+}
+
 bool MeshSurface::Impl::beyond_rim(std::size_t t, const TrianglePoint& at, const Vec3& offset) const {
   // Straight above the rim still counts; rounding of the offset must not decide.
   constexpr Real kStraight = 1e-9;
@@ -209,6 +245,7 @@ MeshSurface::MeshSurface(const TriMesh& mesh) : impl_(std::make_unique<Impl>()) 
   if (s.triangles.empty()) throw InputError(Place{}, "the mesh has no triangle with an area, wanted at least one");
   s.link_sides();
   s.make_normals();
+  s.list_around();
   s.tree = std::make_unique<MeshTree>(s.positions, s.triangles);
   if (s.tree->size() == 0) throw InputError(Place{}, "the mesh has no triangle with an area, wanted at least one");
 }
@@ -220,21 +257,31 @@ MeshSurface& MeshSurface::operator=(MeshSurface&&) noexcept = default;
 const MeshTree& MeshSurface::tree() const { return *impl_->tree; }
 
 Contact MeshSurface::contact(const Vec3& p, Real reach) const {
-  Contact contact;
   const auto nearest = impl_->tree->nearest(p, reach);
-  if (!nearest) return contact;
-  const std::size_t t = nearest->triangle;
-  const TrianglePoint& at = nearest->at;
-  const Vec3 offset = p - at.point;
-  if (impl_->beyond_rim(t, at, offset)) return contact;
+  return nearest ? impl_->contact_at(p, impl_->settled(p, *nearest)) : Contact{};
+}
 
-  Vec3 pseudonormal = impl_->face_normal[t];
-  if (at.feature == Feature::kEdge) pseudonormal = impl_->edge_normal(t, at.index);
-  if (at.feature == Feature::kVertex) pseudonormal = impl_->vertex_normal[impl_->triangles[t][at.index]];
+Contact MeshSurface::contact(const Vec3& p, Real reach, const NearTriangles& cache) const {
+  const auto nearest = cache.nearest(p, reach);
+  return nearest ? impl_->contact_at(p, impl_->settled(p, *nearest)) : Contact{};
+}
+
+std::optional<NearTriangles> MeshSurface::make_cache(Real reach) const { return NearTriangles::build(impl_->positions, impl_->triangles, reach); }
+
+Contact MeshSurface::Impl::contact_at(const Vec3& p, const MeshTree::Nearest& nearest) const {
+  Contact contact;
+  const std::size_t t = nearest.triangle;
+  const TrianglePoint& at = nearest.at;
+  const Vec3 offset = p - at.point;
+  if (beyond_rim(t, at, offset)) return contact;
+
+  Vec3 pseudonormal = face_normal[t];
+  if (at.feature == Feature::kEdge) pseudonormal = edge_normal(t, at.index);
+  if (at.feature == Feature::kVertex) pseudonormal = vertex_normal[triangles[t][at.index]];
   const bool inside = offset.dot(pseudonormal) < 0;
   contact.point = at.point;
-  contact.distance = inside ? -nearest->distance : nearest->distance;
-  contact.normal = impl_->smooth_normal(t, at, offset, inside);
+  contact.distance = inside ? -nearest.distance : nearest.distance;
+  contact.normal = smooth_normal(t, at, offset, inside);
   return contact;
 }
 

@@ -7,6 +7,7 @@
 #include "geometry/collide/contact.h"
 #include "geometry/mesh/tri_mesh.h"
 #include "geometry/query/mesh_tree.h"
+#include "geometry/query/near_triangles.h"
 
 namespace effuse::geometry {
 
@@ -32,6 +33,10 @@ class MeshSurface {
 
   /// Nearest surface within reach [m] of p, on either side. Velocity, temperature and surface are left alone.
   Contact contact(const Vec3& p, Real reach = std::numeric_limits<Real>::infinity()) const;
+  /// The same to the bit by a cache of this surface (make_cache), for reach up to the cache's: 1.6 to 1.8 times as fast.
+  Contact contact(const Vec3& p, Real reach, const NearTriangles& cache) const;
+  /// nullopt where the tree is better: a reach of many triangles.
+  std::optional<NearTriangles> make_cache(Real reach) const;
 
   /// Heights [m] at which the vertical through (x, y) enters the solid from above (or grazes a wall), from the top down.
   std::vector<Real> tops(Real x, Real y) const;

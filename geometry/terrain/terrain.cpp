@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <memory>
 #include <mutex>
 
 #include "geometry/base/check.h"
@@ -24,6 +26,11 @@ struct Terrain::Impl {
   // The field's triangles are made when somebody asks.
   mutable std::once_flag mesh_made;
   mutable TriMesh mesh;
+  // The mesh's cache is made when many points ask with a reach that it does not have yet. It changes no answer.
+  mutable std::mutex cache_guard;
+  mutable std::shared_ptr<const NearTriangles> cache;
+  mutable Real no_cache_from = std::numeric_limits<Real>::infinity();  // reaches that the tree answers better
+  std::shared_ptr<const NearTriangles> cache_for(std::size_t points, Real reach) const;
 
   Contact field_contact(const Vec3& p, Real reach) const;
   Contact contact(const Vec3& p, Real reach) const {
@@ -32,6 +39,21 @@ struct Terrain::Impl {
     return contact;
   }
 };
+
+std::shared_ptr<const NearTriangles> Terrain::Impl::cache_for(std::size_t points, Real reach) const {
+  // Fewer points are answered before a cache is made.
+  constexpr std::size_t kMany = 256;
+  if (field || points < kMany || !(reach > 0) || !std::isfinite(reach)) return nullptr;
+  const std::lock_guard lock(cache_guard);
+  if (cache && cache->reach() >= reach) return cache;
+  if (reach >= no_cache_from) return nullptr;
+  // A reach that grows with the flow's speed need not have one made each time.
+  for (const Real wanted : {cache ? 1.5 * reach : reach, reach})
+    if (wanted < no_cache_from)
+      if (std::optional<NearTriangles> made = surface->make_cache(wanted)) return cache = std::make_shared<const NearTriangles>(std::move(*made));
+  no_cache_from = reach;
+  return nullptr;
+}
 
 Contact Terrain::Impl::field_contact(const Vec3& p, Real reach) const {
   Contact contact;
@@ -86,6 +108,13 @@ Contact Terrain::contact(const Vec3& p, Real reach) const { return impl_->contac
 void Terrain::contacts(std::span<const Vec3> points, Real reach, std::span<Contact> out) const {
   ZONE("terrain.contacts");
   CHECK_EQ(points.size(), out.size());
+  if (const auto cache = impl_->cache_for(points.size(), reach)) {
+    parallel_for(points.size(), [&](std::size_t i) {
+      out[i] = impl_->surface->contact(points[i], reach, *cache);
+      out[i].surface_temperature = impl_->temperature;
+    });
+    return;
+  }
   parallel_for(points.size(), [&](std::size_t i) { out[i] = impl_->contact(points[i], reach); });
 }
 

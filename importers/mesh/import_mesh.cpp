@@ -18,6 +18,7 @@
 #include "importers/assimp_reader.h"
 #include "importers/input_file.h"
 #include "importers/mesh/glb_attributes.h"
+#include "importers/mesh/mesh_bytes.h"
 #include "importers/mesh/ply_importer.h"
 #include "importers/mesh/text_meshes.h"
 
@@ -32,9 +33,6 @@ namespace {
 
 constexpr std::uint64_t kMeshLimit = std::uint64_t{4} << 30;  // bytes
 constexpr std::size_t kVertexLimit = 200'000'000;             // after all copies that nodes ask for
-
-/// x y z of a file with y up, turned to z up: a quarter turn about x.
-const Mat3 kZUpFromYUp = (Mat3() << 1, 0, 0, 0, 0, -1, 0, 1, 0).finished();
 
 struct Placement {
   Mat3 linear = Mat3::Identity();
@@ -264,10 +262,59 @@ void clean(MeshImport& import, const std::string& name) {
   if (import.mesh.triangles.empty()) throw InputError({name}, "holds no triangles: all collapse to edges or points");
 }
 
-}  // namespace
+/// What a COLLADA file says of up and unit. assimp has turned and scaled by them already: y up, metres.
+MeshFrame frame_of_collada(std::string_view text) {
+  MeshFrame frame;
+  frame.source = "COLLADA's asset";
+  frame.up = UpAxis::kY;
+  frame.metres_per_unit = 1;
+  if (text.find("<unit") == std::string_view::npos) frame.source = "COLLADA's standard";
+  return frame;
+}
 
-MeshImport import_mesh(const fs::path& file) {
-  ZONE("import.mesh");
+/// FBX says which axis is up and how many centimetres its unit has.
+MeshFrame frame_of_fbx(const aiScene& scene) {
+  MeshFrame frame;
+  if (!scene.mMetaData) return frame;
+  std::int32_t up = -1;
+  double factor = 0;
+  float factor_f = 0;
+  if (scene.mMetaData->Get("UpAxis", up) && up >= 0 && up <= 2) frame.up = static_cast<UpAxis>(up + 1);
+  if (!scene.mMetaData->Get("UnitScaleFactor", factor) && scene.mMetaData->Get("UnitScaleFactor", factor_f)) factor = factor_f;
+  if (std::isfinite(factor) && factor > 0) frame.metres_per_unit = 0.01 * factor;
+  frame.source = "FBX's settings";
+  return frame;
+}
+
+MeshFrame frame_of(const std::string& extension, std::string_view bytes, const aiScene& scene) {
+  MeshFrame own = frame_of_own_file(bytes, extension);
+  if (!own.source.empty()) return own;
+  if (extension == ".glb" || extension == ".gltf") own = {UpAxis::kY, 1, Vec3::Zero(), "", "glTF's standard"};
+  else if (extension == ".x3d" || extension == ".x3db" || extension == ".wrl") own = {UpAxis::kY, 1, Vec3::Zero(), "", "X3D's standard"};
+  else if (extension == ".dae") own = frame_of_collada(bytes);
+  else if (extension == ".fbx") own = frame_of_fbx(scene);
+  return own;
+}
+
+/// Into metres and z up, as the caller or the file says.
+void place(MeshImport& import, const MeshOptions& options) {
+  const MeshFrame& frame = import.frame;
+  const UpAxis up = options.up != UpAxis::kUnknown ? options.up : frame.up;
+  if (options.up != UpAxis::kUnknown && frame.up != UpAxis::kUnknown && options.up != frame.up)
+    import.notes.push_back(fmt::format("{} says that {} is up; {} is taken, as asked", frame.source, name_of(frame.up), name_of(options.up)));
+  if (up == UpAxis::kX || up == UpAxis::kY) {
+    turn_up(import.mesh, up);
+    import.notes.push_back(fmt::format("turned from {} up to z up{}", name_of(up), options.up != UpAxis::kUnknown ? ", as asked" : ""));
+  }
+  const Real scale = options.metres_per_unit > 0 ? options.metres_per_unit : frame.metres_per_unit > 0 ? frame.metres_per_unit : 1;
+  if (options.metres_per_unit > 0 && frame.metres_per_unit > 0 && options.metres_per_unit != frame.metres_per_unit)
+    import.notes.push_back(fmt::format("{} says that its unit is {:g} m; {:g} m is taken, as asked", frame.source, frame.metres_per_unit, scale));
+  if (scale == 1) return;
+  for (Vec3& p : import.mesh.positions) p *= scale;
+  import.notes.push_back(fmt::format("scaled from a unit of {:g} m to metres{}", scale, options.metres_per_unit > 0 ? ", as asked" : ""));
+}
+
+MeshImport read_mesh(const fs::path& file, const MeshOptions& options) {
   const std::string name = file.string(), extension = lower_extension(file);
   const std::string bytes = read_input(file, kMeshLimit, "a mesh");
 
@@ -305,10 +352,9 @@ MeshImport import_mesh(const fs::path& file) {
   const FaceCount cut = count_faces(*scene, name);
 
   // All meshes as one, in our frame.
-  const bool y_up = extension == ".glb" || extension == ".gltf" || extension == ".dae";
   Collector collector(*scene, name, extension == ".glb" || extension == ".gltf");
   collector.extra = match_primitives(*scene, std::move(primitives), notes);
-  if (scene->mRootNode) collector.add(*scene->mRootNode, y_up ? Placement{kZUpFromYUp, Vec3::Zero()} : Placement{});
+  if (scene->mRootNode) collector.add(*scene->mRootNode, Placement{});
   import.mesh = std::move(collector.mesh);
   if (extension == ".ply") take_over(std::move(ply->mesh), import, name);
   for (Vec3& x : import.mesh.positions) x += checked.origin;
@@ -316,7 +362,8 @@ MeshImport import_mesh(const fs::path& file) {
 
   // What was done, one line each.
   const bool moved = checked.origin != Vec3::Zero();
-  if (y_up) notes.push_back("turned from y up to z up");
+  import.frame = frame_of(extension, bytes, *scene);
+  place(import, options);
   if (moved)
     notes.push_back(fmt::format("read relative to ({:.0f}, {:.0f}, {:.0f}), so that map coordinates keep their digits", checked.origin.x(),
                                 checked.origin.y(), checked.origin.z()));
@@ -333,6 +380,14 @@ MeshImport import_mesh(const fs::path& file) {
   if (extension != ".ply" && !moved && far > 8192)
     notes.push_back(fmt::format("coordinates reach {:.6g}: as floats they come in steps of {:.3g}", far, far * std::pow(2.0, -23)));
   return import;
+}
+
+}  // namespace
+
+MeshImport import_mesh(const fs::path& file, const MeshOptions& options) {
+  ZONE("import.mesh");
+  if (!options.limits.apart) return read_mesh(file, options);
+  return mesh_of_bytes(read_apart(file, options.limits, [&] { return bytes_of_mesh(read_mesh(file, options)); }), file.string());
 }
 
 }  // namespace effuse::importers

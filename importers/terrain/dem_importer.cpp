@@ -16,6 +16,7 @@
 
 #include "geometry/base/check.h"
 #include "geometry/base/error.h"
+#include "geometry/base/state_io.h"
 #include "importers/assimp_reader.h"
 #include "importers/input_file.h"
 #include "importers/terrain/esri_ascii.h"
@@ -158,8 +159,9 @@ class DemImporter final : public Assimp::BaseImporter {
 
 Assimp::BaseImporter* make_dem_importer(std::shared_ptr<DemResult> result, DemRequest request) { return new DemImporter(std::move(result), std::move(request)); }
 
-DemGrid import_dem(const std::vector<std::filesystem::path>& files, const DemOptions& options) {
-  CHECK(!files.empty());
+namespace {
+
+DemGrid read_dem(const std::vector<std::filesystem::path>& files, const DemOptions& options) {
   // Texts are held in memory; of rasters only what is asked for.
   constexpr std::uint64_t kLargestText = std::uint64_t{8} << 30;
   for (const std::filesystem::path& file : files) check_input(file, lower_extension(file) == ".asc" || lower_extension(file) == ".xyz" ? kLargestText : std::numeric_limits<std::uint64_t>::max(), "a terrain");
@@ -176,6 +178,66 @@ DemGrid import_dem(const std::vector<std::filesystem::path>& files, const DemOpt
   }
   if (result->fault) std::rethrow_exception(result->fault);
   return std::move(result->grid);
+}
+
+std::string bytes_of_grid(const DemGrid& grid) {
+  StateWriter out;
+  out.array("place", std::vector<Real>{grid.corner.x(), grid.corner.y(), grid.spacing.x(), grid.spacing.y()});
+  out.value("nx", grid.nx);
+  out.value("ny", grid.ny);
+  out.array("z", grid.z);
+  out.value("nodata", std::uint64_t{grid.nodata});
+  out.text("format", grid.format);
+  out.text("crs", grid.crs);
+  out.value("notes", std::uint64_t{grid.notes.size()});
+  for (const std::string& note : grid.notes) out.text("note", note);
+  return out.bytes();
+}
+
+DemGrid grid_of_bytes(const std::string& bytes, const std::string& name) {
+  // The bytes come from a process that has met a broken file: nothing in them is believed.
+  StateReader in(bytes, name);
+  DemGrid grid;
+  std::vector<Real> place;
+  in.array("place", place);
+  in.value("nx", grid.nx);
+  in.value("ny", grid.ny);
+  in.array("z", grid.z);
+  std::uint64_t count = 0;
+  in.value("nodata", count);
+  grid.nodata = count;
+  in.text("format", grid.format);
+  in.text("crs", grid.crs);
+  in.value("notes", count);
+  for (std::uint64_t k = 0; k < count; ++k) {
+    std::string note;
+    in.text("note", note);
+    grid.notes.push_back(std::move(note));
+  }
+  const bool whole = place.size() == 4 && grid.nx >= 2 && grid.ny >= 2 && grid.z.size() == static_cast<std::size_t>(grid.nx) * static_cast<std::size_t>(grid.ny);
+  if (!whole) throw InputError({name}, "was not read as a whole");
+  grid.corner = Vec2(place[0], place[1]);
+  grid.spacing = Vec2(place[2], place[3]);
+  return grid;
+}
+
+}  // namespace
+
+DemGrid import_dem(const std::vector<std::filesystem::path>& files, const DemOptions& options) {
+  CHECK(!files.empty());
+  if (!options.limits.apart) return read_dem(files, options);
+  ReadLimits limits = options.limits;
+  std::uint64_t bytes = 0;
+  for (const std::filesystem::path& file : files) {
+    std::error_code ignored;
+    const std::uintmax_t size = std::filesystem::file_size(file, ignored);
+    if (!ignored) bytes += size;
+  }
+  // A grid is held a few times over while it is placed and handed back; a compressed file may hold as many posts as are allowed.
+  constexpr std::uint64_t kBytesPerPost = 48;
+  if (limits.bytes == 0) limits.bytes = (std::uint64_t{768} << 20) + 8 * bytes + kBytesPerPost * std::min(options.max_posts, std::uint64_t{1} << 32);
+  if (limits.seconds == 0) limits.seconds = 60 + static_cast<double>(bytes) / 2e6;
+  return grid_of_bytes(read_apart(files.front(), limits, [&] { return bytes_of_grid(read_dem(files, options)); }), files.front().string());
 }
 
 }  // namespace effuse::importers

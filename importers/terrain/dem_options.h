@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "geometry/base/types.h"
+#include "importers/read_apart.h"
 
 namespace effuse::importers {
 
@@ -46,6 +47,7 @@ struct DemOptions {
   std::vector<Real> size;   ///< of an image's ground, first post to last, east-west and north-south [m]; empty: as the file says
   std::vector<Real> range;  ///< heights of an image's darkest and brightest value [m]; empty: values are heights
   std::uint64_t max_posts = 50'000'000;  ///< more are refused: a header may promise anything
+  ReadLimits limits;       ///< of reading and placing; where no bytes are given, room for max_posts is added
 };
 
 }  // namespace effuse::importers

@@ -1,10 +1,13 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "geometry/repair/repair.h"
 #include "geometry/terrain/terrain.h"
+#include "importers/mesh/import_mesh.h"
 #include "importers/terrain/dem_grid.h"
 #include "importers/terrain/dem_options.h"
 
@@ -13,13 +16,16 @@ namespace effuse::importers {
 struct TerrainImportOptions {
   Real temperature = 288.15;  ///< of the ground [K]
   DemOptions dem;             ///< of grids; of a mesh only crs counts: its name
-  bool y_up = false;          ///< meshes: y is up in the file (formats that say so themselves need no telling)
+  MeshOptions mesh;           ///< of meshes: up axis, unit, and the limits of their parsers; those of grids are in dem
+  bool repair = true;         ///< meshes: made sound (repair.h), every change noted
+  geometry::RepairOptions repairs;
 };
 
 /// What was done to the file on the way in, for people: one line each ("3 nodata cells left as holes").
 struct TerrainImport {
   geometry::Terrain terrain;
   std::vector<std::string> notes;
+  std::optional<geometry::RepairReport> repairs;  ///< of meshes that were to be repaired
 };
 
 /// Reads a DEM grid of any format and place (import_dem.h) or a mesh of any format assimp reads as ground.
@@ -28,13 +34,17 @@ struct TerrainImport {
 /// origin is, in x and y, the south-west corner of the covered area rounded down to whole metres, in z 0;
 /// it is subtracted in double and kept in the terrain's Georeference, with the CRS.
 ///
-/// An open mesh whose surface faces down on the whole is turned over, with a note.
+/// A mesh is repaired first, unless it is to stay as it is. An open one whose surface faces down on the whole is turned over,
+/// with a note. One that effuse wrote lies on the map where its metadata says.
 ///
 /// Throws InputError naming the file, and the line where there is one: missing, empty, truncated, not
 /// a number, wrong counts, fewer than 2x2 posts, nothing but nodata.
 TerrainImport import_terrain(const std::filesystem::path& file, const TerrainImportOptions& options = {});
 /// Several grids as a mosaic; one file may be a mesh.
 TerrainImport import_terrain(const std::vector<std::filesystem::path>& files, const TerrainImportOptions& options = {});
+
+/// The ground that a mesh is: repaired, facing up, in its local frame.
+TerrainImport terrain_from_mesh(MeshImport import, const std::string& name, const TerrainImportOptions& options = {});
 
 /// The height field of a grid, in its local frame.
 TerrainImport terrain_from_grid(DemGrid grid, const std::string& name, const TerrainImportOptions& options = {});

@@ -62,7 +62,7 @@ std::string told(const SolidThings& solids) {
 }  // namespace
 
 ExitCode check(const CheckCommand& command, const CommonOptions& common) {
-  const std::unique_ptr<LoadedScene> loaded = load_scene(command.scene, command.set, 0);
+  const std::unique_ptr<LoadedScene> loaded = load_scene(command.scene, command.set, 0, read_limits(common));
   const flow::Scene& scene = loaded->scene;
   flow::Estimate sum;
   std::string simulated, left_out;
@@ -72,19 +72,21 @@ ExitCode check(const CheckCommand& command, const CommonOptions& common) {
     sum.bytes += plan.estimate.bytes;
     sum.steps += plan.estimate.steps;
     sum.seconds += plan.estimate.seconds;
-    simulated += (simulated.empty() ? "" : ", ") + plan.name;
+    sum.drawn += plan.estimate.drawn;
+    sum.cells += plan.estimate.cells;
+    simulated += (simulated.empty() ? "" : ", ") + (plan.name == plan.kind ? plan.name : fmt::format("{} ({})", plan.name, plan.kind));
   }
   for (const flow::EffectKind& kind : flow::effect_kinds()) {
     bool named = false;
-    for (const flow::EffectPlan& plan : scene.effects) named |= plan.name == kind.name;
+    for (const flow::EffectPlan& plan : scene.effects) named |= plan.kind == kind.name;
     if (!named && !kind.of_solids) left_out += (left_out.empty() ? "" : ", ") + kind.name;
   }
   // Skin and files of a frame, as Maunga Whau takes them: 80 us a particle, and 0.7 us a pixel for the picture.
-  const double frame_s = 80e-6 * sum.mean_particles + (loaded->skin.preview ? 7e-7 * loaded->skin.picture.width * loaded->skin.picture.height : 0);
+  const double frame_s = 80e-6 * sum.mean_particles + 5e-6 * sum.drawn + (loaded->skin.preview ? 4e-8 : 2e-8) * sum.cells + (loaded->skin.preview ? 7e-7 * loaded->skin.picture.width * loaded->skin.picture.height : 0);
   const SolidThings& solids = loaded->solids;
   const bool drawn = loaded->skin.preview || (loaded->skin.ply && solids.any_moves());
   const double seconds = sum.seconds + solids.start_seconds() + scene.frames * (frame_s + (drawn ? solids.frame_seconds() : 0));
-  const double disk = scene.frames * (disk_per_frame(sum.mean_particles, loaded->skin) + (loaded->skin.ply && solids.any_moves() ? 94.0 * static_cast<double>(solids.triangles()) : 0));
+  const double disk = scene.frames * (disk_per_frame(sum.mean_particles, loaded->skin) + (loaded->skin.ply && solids.any_moves() ? 94.0 * static_cast<double>(solids.triangles()) : 0) + 40 * sum.drawn + 2 * sum.cells);
   const double memory = sum.bytes + solids.memory() + memory_of_skin(sum.particles, loaded->terrain->mesh().positions.size(), loaded->skin);
 
   if (common.json) {
@@ -95,7 +97,7 @@ ExitCode check(const CheckCommand& command, const CommonOptions& common) {
     j["simulated_s"] = scene.frame_time(scene.frames);
     j["effects"] = nlohmann::ordered_json::array();
     for (const flow::EffectPlan& plan : scene.effects)
-      j["effects"].push_back({{"name", plan.name}, {"particles", plan.estimate.particles}, {"memory_bytes", plan.estimate.bytes}, {"steps", plan.estimate.steps}, {"seconds", plan.estimate.seconds}});
+      j["effects"].push_back({{"name", plan.name}, {"kind", plan.kind}, {"particles", plan.estimate.particles}, {"memory_bytes", plan.estimate.bytes}, {"steps", plan.estimate.steps}, {"seconds", plan.estimate.seconds}});
     j["seconds"] = seconds;
     j["memory_bytes"] = memory;
     j["disk_bytes"] = disk;
@@ -111,6 +113,10 @@ ExitCode check(const CheckCommand& command, const CommonOptions& common) {
   fmt::print("  not asked    {}\n", left_out.empty() ? "-" : left_out);
   if (solids.any()) fmt::print("  solids       {}\n", told(solids));
   if (sum.particles > 0) fmt::print("  particles    about {:.0f} at the end\n", sum.particles);
+  if (sum.drawn > 0) fmt::print("  drawn        about {:.0f} particles one by one\n", sum.drawn);
+  if (sum.cells > 0) fmt::print("  cells        about {:.0f} of grids\n", sum.cells);
+  for (const auto& effect : loaded->simulation->effects())
+    for (const std::string& remark : effect->remarks()) fmt::print("  {:<12} {}\n", effect->name(), remark);
   fmt::print("  steps        about {:.0f}\n", sum.steps);
   fmt::print("  memory       about {} at the end, {} of it the simulation's\n", bytes(memory), bytes(sum.bytes));
   fmt::print("  disk         about {}\n", bytes(disk));

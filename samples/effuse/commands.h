@@ -19,6 +19,7 @@ struct CommonOptions {
   bool json = false, quiet = false;
   int threads = 0;  ///< 0: all
   std::string program = "effuse";  ///< as it was called: for lines that say what to call next
+  std::string read_limit;          ///< of time and memory to read a file: "60s,4GB"; empty: by its size
 };
 
 struct RunCommand {
@@ -42,8 +43,8 @@ ExitCode effects(const CommonOptions& common);
 /// `effuse import`: terrain into the form another program wants. Lengths may carry their unit.
 struct ImportCommand {
   std::vector<std::filesystem::path> files;  ///< one terrain, or the tiles of one
-  std::filesystem::path output;              ///< .tif .asc: a grid; .ply .obj .glb .stl: a mesh
-  std::string max_error;                     ///< of a grid's mesh at its posts [m]; empty: all posts become vertices
+  std::filesystem::path output;              ///< .tif .asc: a grid; .ply .obj .glb .stl .off: a mesh
+  std::string max_error;                     ///< of a grid's mesh at its posts, or of a mesh from itself [m]; empty: all posts or vertices stay
   std::string crs, file_crs;                 ///< to work in; of the files
   std::vector<double> crop;                  ///< west, south, east, north; empty: all
   std::string resample;                      ///< "10 m", "cubic", or both with a comma; empty: as the file has them
@@ -52,7 +53,14 @@ struct ImportCommand {
   std::string pits = "keep";                 ///< or "fill", "breach"; "fill:2m": only those up to 2 m deep
   std::vector<double> size, range;           ///< of an image's ground and heights [m]
   std::uint64_t max_posts = 50'000'000;
-  std::string up = "z";                      ///< of a mesh
+  // Of meshes:
+  std::string up;                            ///< "x", "y", "z"; empty: as the file says, or z
+  std::string units;                         ///< "mm", "ft", ...; empty: as the file says, or metres
+  bool keep = false;                         ///< not repaired
+  std::string edge;                          ///< remeshed to triangles of such edges; empty: not
+  std::string fill_holes;                    ///< up to such a diagonal, or "all"; empty: none
+  std::string cell;                          ///< between the posts of a grid made of it
+  bool on_map = false;                       ///< positions as map coordinates, not relative to an origin: .ply .obj .off
 };
 /// Says each thing that it changed. Nothing is written when the input is refused.
 ExitCode import_terrain_file(const ImportCommand& command, const CommonOptions& common);
@@ -74,7 +82,7 @@ struct SkinCommand {
   std::string tessellation = "levelset";         ///< or "voronoi"
   double coarsen = 0;                            ///< in particle spacings, 2 radii; 0: not
   std::string kind = "none";                     ///< smooth, or a name of skin::kSkinKindNames: displaced and coloured
-  std::optional<double> amplitude, edge;         ///< of the displacement, and of the mesh [particle spacings]; absent: the kind's, the cube size
+  std::optional<double> amplitude, edge, oversample;  ///< of the displacement, of the mesh [particle spacings], and edges so many times shorter; absent: the kind's, the cube size, 1
   std::optional<std::uint64_t> seed;
   std::string temperature;                       ///< of particles whose file has none, "1100" [K] or with its unit; empty: cold rock
   std::filesystem::path terrain;                 ///< where the skin ends, in the particles' coordinates; empty: none

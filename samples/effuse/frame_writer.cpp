@@ -12,14 +12,19 @@
 #include "skin/color/lava_color.h"
 #include "skin/preview/preview.h"
 #include "skin/surface/level_set.h"
+#include "samples/effuse/air_look.h"
 #include "samples/effuse/solid_things.h"
 #include "skin/tessellate/make_skin.h"
+#include "skin/write/write_points.h"
+#include "skin/write/write_volume.h"
 
 namespace effuse {
 
 namespace fs = std::filesystem;
 
 namespace {
+constexpr Real kShutter = 0.5;  // of a frame's time: what flies is drawn as long as it flies in that
+
 std::string numbered(const char* stem, int frame, const char* extension) { return fmt::format("{}.{:04}.{}", stem, frame, extension); }
 }  // namespace
 
@@ -56,7 +61,7 @@ FrameWriter::Result FrameWriter::write_frame(const flow::Simulation& simulation)
   const int frame = simulation.frame();
   const skin::Metadata about = metadata(frame, simulation.time());
   Result result;
-  if (!settings_.ply && !settings_.obj && !settings_.glb && !settings_.vdb && !preview_) return result;  // nobody asked for a skin
+  if (!settings_.ply && !settings_.obj && !settings_.glb && !settings_.vdb && !preview_) return result;  // nobody asked for frames
   skin::Skin skin;
   for (const auto& effect : simulation.effects()) {
     if (effect->spacing() <= 0) continue;
@@ -93,18 +98,35 @@ FrameWriter::Result FrameWriter::write_frame(const flow::Simulation& simulation)
   const bool moving = pieces_ || solids_.any_moves();
   const geometry::TriMesh solids = solids_.at(simulation.time(), poses, pieces);
   if (settings_.ply && moving) skin::write_ply(frames / numbered("obstacles", frame, "ply"), solids, about);
-  geometry::TriMesh others;
-  if (preview_) others = for_picture(solids);
+  geometry::TriMesh others = solids;
   for (const auto& effect : simulation.effects())
     for (flow::NamedMesh& own : effect->meshes()) {
       if (std::find(meshes_.begin(), meshes_.end(), own.name) == meshes_.end()) meshes_.push_back(own.name);
       if (settings_.ply) write_own(own, frame);
-      if (!preview_) continue;
-      if (others.positions.empty()) others = for_picture(std::move(own.mesh));
-      else geometry::append(others, for_picture(std::move(own.mesh)));
+      if (preview_) append_to_picture(others, own.mesh);
     }
+  skin::Air air;
+  const Real exposure = kShutter * scene_.time_scale / scene_.fps;
+  for (const auto& effect : simulation.effects()) {
+    for (const flow::NamedCloud& cloud : effect->clouds()) {
+      if (settings_.ply && (cloud.points || cloud.spheres)) {
+        if (std::find(meshes_.begin(), meshes_.end(), cloud.name) == meshes_.end()) meshes_.push_back(cloud.name);
+        const fs::path file = frames / numbered(cloud.name.c_str(), frame, "ply");
+        if (cloud.spheres) skin::write_ply(file, spheres_of(cloud), about);
+        else skin::write_points_ply(file, cloud.view(), about);
+      }
+      if (preview_) add_cloud(air, cloud, exposure);
+    }
+    const std::optional<Vec3> color = effect->draws_volumes();
+    if (!settings_.vdb && !(preview_ && color)) continue;
+    for (geometry::GridVolume& volume : effect->volumes()) {
+      if (std::find(volumes_.begin(), volumes_.end(), volume.name) == volumes_.end()) volumes_.push_back(volume.name);
+      if (settings_.vdb) skin::write_volume_vdb(frames / numbered(volume.name.c_str(), frame, "vdb"), volume, about);
+      if (preview_ && color) add_volume(air, std::move(volume), *color);
+    }
+  }
   if (preview_) {
-    const skin::Image image = preview_->render(in_one_picture(mesh, others), skin::picture_at(settings_, terrain_, frame / scene_.fps));
+    const skin::Image image = preview_->render(in_one_picture(mesh, others), skin::picture_at(settings_, terrain_, frame / scene_.fps), air);
     skin::write_png(folder_ / "preview" / numbered("preview", frame, "png"), image);
   }
   return result;
@@ -176,6 +198,8 @@ void FrameWriter::write_manifest(int frames_done, const std::vector<std::pair<st
   if (lava_ && settings_.vdb) files["vdb"] = "frames/lava.####.vdb";
   for (const std::string& name : meshes_)
     if (settings_.ply) files[name] = fmt::format("frames/{}.####.ply", name);
+  for (const std::string& name : volumes_)
+    if (settings_.vdb) files[name + "_vdb"] = fmt::format("frames/{}.####.vdb", name);
   if (settings_.preview) files["preview"] = "preview/preview.####.png";
   m["files"] = files;
   for (const auto& [name, path] : flow) m["flow"][name] = path;

@@ -58,7 +58,7 @@ class FrameWriter {
   std::filesystem::path folder_;
   bool lava_ = false;  // or bodies alone: no skin
   std::unique_ptr<skin::Preview> preview_;
-  std::vector<std::string> meshes_;  // names of what effects show beside the lava
+  std::vector<std::string> meshes_, volumes_;  // names of what effects show beside the lava
   skin::SurfaceCache last_;  // saves work, changes nothing
 };
 

@@ -13,6 +13,8 @@
 #include "importers/terrain/import_dem.h"
 #include "importers/terrain/import_terrain.h"
 #include "samples/effuse/commands.h"
+#include "samples/effuse/import_report_internal.h"
+#include "samples/effuse/load_scene.h"
 #include "skin/write/raster.h"
 #include "skin/write/write_mesh.h"
 
@@ -24,25 +26,6 @@ namespace {
 
 using json = nlohmann::ordered_json;
 
-constexpr std::array kGridFormats = {".tif", ".asc"};
-constexpr std::array kMeshFormats = {".ply", ".obj", ".glb", ".stl"};
-
-/// What became of the file: lines for people and the same as JSON.
-struct Report {
-  std::vector<std::string> lines;
-  json facts = json::object();
-};
-
-Real metres(const std::string& text, const char* option) {
-  try {
-    const Real value = parse_quantity(text, "m");
-    if (value >= 0 && std::isfinite(value)) return value;
-  } catch (const std::invalid_argument& error) {
-    throw InputError(Place{}, fmt::format("{}: {}", option, error.what()));
-  }
-  throw InputError(Place{}, fmt::format("{}: '{}' is less than 0", option, text));
-}
-
 /// The index of word among names, or a fault that names the nearest.
 template <std::size_t n>
 std::size_t one_of(const std::string& word, const std::array<const char*, n>& names, const std::string& option) {
@@ -53,7 +36,7 @@ std::size_t one_of(const std::string& word, const std::array<const char*, n>& na
   throw InputError(Place{}, nearest.empty() ? fmt::format("{}: no such choice '{}', wanted one of {}", option, word, fmt::join(all, ", ")) : fmt::format("{}: no such choice '{}', did you mean '{}'?", option, word, nearest));
 }
 
-importers::TerrainImportOptions options_of(const ImportCommand& command) {
+importers::TerrainImportOptions options_of(const ImportCommand& command, const importers::ReadLimits& limits) {
   importers::TerrainImportOptions options;
   importers::DemOptions& dem = options.dem;
   dem.crs = command.crs;
@@ -63,6 +46,7 @@ importers::TerrainImportOptions options_of(const ImportCommand& command) {
   dem.size = command.size;
   dem.range = command.range;
   dem.max_posts = command.max_posts;
+  dem.limits = limits;
   dem.holes = static_cast<importers::HolePolicy>(one_of(command.holes, std::array{"hole", "fill", "error"}, "--holes"));
   const std::size_t colon = command.pits.find(':');
   dem.pits = static_cast<importers::PitPolicy>(one_of(command.pits.substr(0, colon), std::array{"keep", "fill", "breach"}, "--pits"));
@@ -75,23 +59,12 @@ importers::TerrainImportOptions options_of(const ImportCommand& command) {
     else dem.resampling = static_cast<importers::Resampling>(one_of(part, std::array{"auto", "nearest", "bilinear", "cubic", "average"}, "--resample"));
     if (dem.spacing == 0 && part.find_first_of("0123456789") == 0) throw InputError(Place{}, "--resample: posts 0 m apart, wanted more");
   }
-  options.y_up = command.up == "y";
   return options;
 }
 
-skin::Metadata metadata_of(const geometry::Georeference& geo) {
-  return {{"generator", "effuse"}, {"origin", fmt::format("{:.17g} {:.17g} {:.17g}", geo.origin.x(), geo.origin.y(), geo.origin.z())}, {"crs", geo.crs}, {"units", "metres"}};
-}
+}  // namespace
 
-void write_mesh(const fs::path& file, const std::string& format, const geometry::TriMesh& mesh, const geometry::Georeference& geo) {
-  const skin::Metadata metadata = metadata_of(geo);
-  if (format == ".ply") skin::write_ply(file, mesh, metadata);
-  else if (format == ".obj") skin::write_obj(file, mesh, metadata);
-  else if (format == ".glb") skin::write_glb(file, mesh, metadata);
-  else skin::write_stl(file, mesh, metadata);
-}
-
-void write_grid(const fs::path& file, const std::string& format, const importers::DemGrid& grid, Report& report) {
+void write_import_grid(const fs::path& file, const std::string& format, const importers::DemGrid& grid, ImportReport& report) {
   skin::Raster raster;
   raster.cell = grid.spacing;
   raster.corner = grid.corner - grid.spacing / 2;
@@ -106,28 +79,28 @@ void write_grid(const fs::path& file, const std::string& format, const importers
   report.lines.push_back(fmt::format("{}: {} x {} posts, {:.6g} x {:.6g} m apart", file.string(), grid.nx, grid.ny, grid.spacing.x(), grid.spacing.y()));
 }
 
-/// Positions as files hold them.
-geometry::TriMesh as_floats(geometry::TriMesh mesh) {
-  for (Vec3& p : mesh.positions) p = p.cast<float>().cast<Real>();
-  return mesh;
-}
+namespace {
 
 /// A grid of heights, to a grid or a mesh.
-void import_grid(const ImportCommand& command, const std::string& format, Report& report) {
-  const bool to_grid = std::find(kGridFormats.begin(), kGridFormats.end(), format) != kGridFormats.end();
+void import_grid(const ImportCommand& command, const std::string& format, const importers::ReadLimits& limits, ImportReport& report) {
+  const std::array<std::pair<const char*, bool>, 6> of_meshes = {{{"--up", !command.up.empty()}, {"--units", !command.units.empty()}, {"--keep", command.keep}, {"--edge", !command.edge.empty()}, {"--fill-holes", !command.fill_holes.empty()}, {"--cell", !command.cell.empty()}}};
+  for (const auto& [option, given] : of_meshes)
+    if (given) throw InputError({command.files.front().string()}, fmt::format("is a grid of heights, and {} is for meshes{}", option, std::string_view(option) == "--cell" ? ": --resample says how far apart posts are" : ""));
+
+  const bool to_grid = is_grid_format(format);
   if (to_grid && !command.max_error.empty()) throw InputError(Place{}, fmt::format("--max-error is of a mesh, and {} is a grid", command.output.string()));
   const Real max_error = command.max_error.empty() ? 0 : metres(command.max_error, "--max-error");
-  const importers::TerrainImportOptions options = options_of(command);
+  const importers::TerrainImportOptions options = options_of(command, limits);
   importers::DemGrid grid = importers::import_dem(command.files, options.dem);
   report.lines = grid.notes;
   report.facts["grid"] = {{"nx", grid.nx}, {"ny", grid.ny}, {"spacing_m", {grid.spacing.x(), grid.spacing.y()}}, {"south_west_post", {grid.corner.x(), grid.corner.y()}}, {"holes", grid.nodata}, {"crs", grid.crs}};
-  if (to_grid) return write_grid(command.output, format, grid, report);
+  if (to_grid) return write_import_grid(command.output, format, grid, report);
 
   const geometry::Terrain terrain = importers::terrain_from_grid(std::move(grid), command.files.front().string(), options).terrain;
   const geometry::HeightField& field = *terrain.height_field();
   const geometry::Georeference& geo = terrain.georeference();
   if (command.max_error.empty()) {
-    write_mesh(command.output, format, terrain.mesh(), geo);
+    write_import_mesh(command.output, format, terrain.mesh(), geo, command.on_map);
     report.lines.push_back(fmt::format("{}: {} vertices, {} triangles: every post", command.output.string(), terrain.mesh().positions.size(), terrain.mesh().triangles.size()));
     report.facts["mesh"] = {{"vertices", terrain.mesh().positions.size()}, {"triangles", terrain.mesh().triangles.size()}};
     return;
@@ -140,26 +113,11 @@ void import_grid(const ImportCommand& command, const std::string& format, Report
     mesh = geometry::triangulate(field, std::max(max_error - rounding, Real{0}));
     error = geometry::vertical_error(field, as_floats(mesh));
   }
-  write_mesh(command.output, format, mesh, geo);
+  write_import_mesh(command.output, format, mesh, geo, command.on_map);
   report.lines.push_back(fmt::format("{}: {} vertices, {} triangles, of {} posts", command.output.string(), mesh.positions.size(), mesh.triangles.size(), field.posts().size()));
   report.lines.push_back(fmt::format("measured: at the posts {:.4g} m off at most (asked {:.4g} m), between them {:.4g} m (with every post {:.4g} m: cells are twisted); {} posts uncovered", error.at_posts, max_error,
                                      error.between, geometry::twist_error(field), error.uncovered));
   report.facts["mesh"] = {{"vertices", mesh.positions.size()}, {"triangles", mesh.triangles.size()}, {"max_error_m", max_error}, {"measured_error_m", error.at_posts}, {"measured_between_posts_m", error.between}, {"uncovered_posts", error.uncovered}};
-}
-
-/// A mesh, to a mesh: as it is, in a local frame, facing up.
-void import_mesh_file(const ImportCommand& command, const std::string& format, Report& report) {
-  if (command.files.size() > 1) throw InputError({command.files.front().string()}, "is a mesh: several files make a mosaic of grids only");
-  if (std::find(kMeshFormats.begin(), kMeshFormats.end(), format) == kMeshFormats.end()) throw InputError({command.files.front().string()}, fmt::format("is a mesh, and {} is no format of meshes: wanted {}", command.output.string(), fmt::join(kMeshFormats, " ")));
-  const std::array<std::pair<const char*, bool>, 6> of_grids = {{{"--max-error", !command.max_error.empty()}, {"--crop", !command.crop.empty()}, {"--resample", !command.resample.empty()}, {"--file-crs", !command.file_crs.empty()}, {"--holes", command.holes != "hole"}, {"--pits", command.pits != "keep"}}};
-  for (const auto& [option, given] : of_grids)
-    if (given) throw InputError({command.files.front().string()}, fmt::format("is a mesh, and {} is for grids", option));
-  const importers::TerrainImport import = importers::import_terrain(command.files.front(), options_of(command));
-  const geometry::TriMesh& mesh = import.terrain.mesh();
-  write_mesh(command.output, format, mesh, import.terrain.georeference());
-  report.lines = import.notes;
-  report.lines.push_back(fmt::format("{}: {} vertices, {} triangles", command.output.string(), mesh.positions.size(), mesh.triangles.size()));
-  report.facts["mesh"] = {{"vertices", mesh.positions.size()}, {"triangles", mesh.triangles.size()}};
 }
 
 }  // namespace
@@ -168,15 +126,17 @@ ExitCode import_terrain_file(const ImportCommand& command, const CommonOptions& 
   std::string format = command.output.extension().string();
   std::transform(format.begin(), format.end(), format.begin(), [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
   if (format == ".tiff") format = ".tif";
-  if (std::find(kGridFormats.begin(), kGridFormats.end(), format) == kGridFormats.end() && std::find(kMeshFormats.begin(), kMeshFormats.end(), format) == kMeshFormats.end())
+  if (!is_grid_format(format) && !is_mesh_format(format))
     throw InputError(Place{}, fmt::format("-o {}: wanted a grid ({}) or a mesh ({})", command.output.string(), fmt::join(kGridFormats, " "), fmt::join(kMeshFormats, " ")));
   std::error_code ignored;
   for (const fs::path& file : command.files)
     if (fs::equivalent(file, command.output, ignored)) throw InputError(Place{}, fmt::format("-o {}: is what is read, and would be lost", command.output.string()));
 
-  Report report;
-  if (importers::is_dem(command.files.front())) import_grid(command, format, report);
-  else import_mesh_file(command, format, report);
+  ImportReport report;
+  const importers::ReadLimits limits = read_limits(common);
+  if (command.on_map && (format == ".glb" || format == ".stl" || is_grid_format(format))) throw InputError(Place{}, fmt::format("--on-map: {} has no room for map coordinates, .ply, .obj and .off have", format));
+  if (importers::is_dem(command.files.front())) import_grid(command, format, limits, report);
+  else import_mesh_file(command, format, limits, report);
 
   if (common.json) {
     json j;

@@ -8,6 +8,7 @@
 #include "geometry/base/files.h"
 #include "importers/info.h"
 #include "samples/effuse/commands.h"
+#include "samples/effuse/load_scene.h"
 #include "skin/surface/level_set.h"
 
 namespace effuse {
@@ -97,21 +98,22 @@ std::vector<std::string> describe_run(const fs::path& folder) {
   return lines;
 }
 
-importers::FileFacts describe(const fs::path& file) {
+importers::FileFacts describe(const fs::path& file, const importers::ReadLimits& limits) {
   std::error_code ignored;  // a link to itself, a name too long: the reader says so
   if (const std::optional<fs::path> run = run_of(file)) return {describe_run(*run), ""};
   if (fs::is_directory(file, ignored)) throw InputError(Place{file.string()}, "is a folder that holds no run (no manifest.json), wanted a file or the folder of a run");
   if (file.extension() == ".vdb") return {skin::describe_vdb(file), ""};
-  return importers::file_facts(file);
+  return importers::file_facts(file, limits);
 }
 }  // namespace
 
 ExitCode info(const std::vector<fs::path>& files, const CommonOptions& common) {
   nlohmann::ordered_json j = nlohmann::ordered_json::array();
   std::vector<Fault> faults;
+  const importers::ReadLimits limits = read_limits(common);
   for (const fs::path& file : files) {
     try {
-      const importers::FileFacts facts = describe(file);
+      const importers::FileFacts facts = describe(file, limits);
       const std::vector<std::string>& lines = facts.lines;
       j.push_back({{"file", file.string()}, {"facts", lines}});
       if (!facts.values.empty()) j.back()["values"] = nlohmann::ordered_json::parse(facts.values);

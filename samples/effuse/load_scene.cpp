@@ -20,6 +20,21 @@
 namespace effuse {
 
 namespace {
+/// Tables of a scene that may name files, each by its key `file`: things, and emitters within particles.
+std::vector<flow::Node*> tables_with_files(const std::string& name, flow::Node& table) {
+  std::vector<flow::Node*> all;
+  const bool things = name == "obstacle" || name == "body" || name == "springs" || name == "elastic" || name == "figure";
+  for (flow::Node& one : table.items) {
+    if (things) all.push_back(&one);
+    if (name != "particles") continue;
+    for (auto& [key, value] : one.entries)
+      if (key == "emitter")
+        for (flow::Node& emitter : value.items)
+          if (emitter.find("file")) all.push_back(&emitter);
+  }
+  return all;
+}
+
 /// The tables that decide the state of frame n, whatever the number of frames and the files made of it.
 std::string state_key(const flow::Node& resolved, const geometry::Terrain& terrain, const SolidThings& solids, const flow::Simulation& start) {
   StateHash hash;
@@ -30,8 +45,7 @@ std::string state_key(const flow::Node& resolved, const geometry::Terrain& terra
     if (name == "film") copy.set("frames", flow::Node{});
     // What files hold counts, not where they lie.
     if (name == "terrain") copy.set("file", flow::Node{});
-    if (name == "obstacle" || name == "body" || name == "springs" || name == "elastic" || name == "figure")
-      for (flow::Node& one : copy.items) one.set("file", flow::Node{});
+    for (flow::Node* one : tables_with_files(name, copy)) one->set("file", flow::Node{});
     hash.add(importers::to_toml(part));
   }
   for (const flow::PlacedObstacle& each : solids.obstacles) {
@@ -48,7 +62,12 @@ std::string state_key(const flow::Node& resolved, const geometry::Terrain& terra
 }
 }  // namespace
 
-std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const std::vector<std::string>& overrides, int frames) {
+importers::ReadLimits read_limits(const CommonOptions& common) {
+  const importers::ReadLimits apart{true, 0, 0};
+  return common.read_limit.empty() ? apart : importers::parse_read_limits(common.read_limit, apart);
+}
+
+std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const std::vector<std::string>& overrides, int frames, const importers::ReadLimits& limits) {
   ZONE("load");
   flow::Node node = file.extension() == ".w" ? importers::jello_scene(importers::read_jello_world(file), file) : importers::read_scene_file(file);
   for (const std::string& assignment : overrides) importers::apply_override(node, assignment);
@@ -70,7 +89,7 @@ std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const
   if (!scene.terrain.files.empty()) {
     try {
       for (const std::string& name : scene.terrain.files) terrain_paths.push_back(std::filesystem::path(name).is_relative() ? file.parent_path() / name : std::filesystem::path(name));
-      importers::TerrainImport import = importers::import_terrain(terrain_paths, terrain_options(scene.terrain));
+      importers::TerrainImport import = importers::import_terrain(terrain_paths, terrain_options(scene.terrain, limits));
       loaded->terrain = std::move(import.terrain);
       loaded->notes = std::move(import.notes);
     } catch (const InputError& error) {
@@ -83,17 +102,17 @@ std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const
     loaded->notes.push_back(fmt::format("plane of {:g} x {:g} m, slope {:.3g} deg", plane->size.x(), plane->size.y(), plane->slope * 180 / kPi));
   }
   if (loaded->terrain) {
-    loaded->solids.obstacles = load_obstacles(scene, file.parent_path(), *loaded->terrain, faults, loaded->notes);
-    loaded->solids.bodies = load_bodies(scene, file.parent_path(), *loaded->terrain, faults, loaded->notes);
+    loaded->solids.obstacles = load_obstacles(scene, {file.parent_path(), limits}, *loaded->terrain, faults, loaded->notes);
+    loaded->solids.bodies = load_bodies(scene, {file.parent_path(), limits}, *loaded->terrain, faults, loaded->notes);
     SolidThings& solids = loaded->solids;
     if (solids.obstacles.size() == scene.obstacles.size() && solids.bodies.size() == scene.bodies.size())
       solids.joints = load_joints(scene, solids.obstacles, solids.bodies, *loaded->terrain, faults, loaded->notes);
     // Behind the scene's own obstacles, whose numbers joints have.
-    for (flow::PlacedObstacle& bone : load_figures(scene, file.parent_path(), *loaded->terrain, faults, loaded->notes)) solids.obstacles.push_back(std::move(bone));
+    for (flow::PlacedObstacle& bone : load_figures(scene, {file.parent_path(), limits}, *loaded->terrain, faults, loaded->notes)) solids.obstacles.push_back(std::move(bone));
   }
   const auto world = [&] {
     return flow::World{&*loaded->terrain, scene.seed, &loaded->solids.obstacles, &loaded->solids.bodies, &loaded->solids.joints, scene.body_settings,
-                       [&](const flow::PlannedForm& form) { return load_form(form, file.parent_path()); }};
+                       [&](const flow::PlannedForm& form) { return load_form(form, {file.parent_path(), limits}, loaded->notes); }};
   };
   if (!faults.empty() && loaded->terrain) {
     for (const flow::EffectPlan& plan : scene.effects)
@@ -120,9 +139,8 @@ std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const
         for (const std::filesystem::path& path : terrain_paths) files.items.push_back(whole(std::filesystem::absolute(path).lexically_normal()));
         table.set("file", files.items.size() == 1 ? files.items.front() : files);
       }
-      if (name != "obstacle" && name != "body" && name != "springs" && name != "elastic" && name != "figure") continue;
-      for (flow::Node& one : table.items)
-        if (const flow::Node* path = one.find("file"); path && !path->text.empty()) one.set("file", whole(std::filesystem::absolute(file.parent_path() / path->text).lexically_normal()));
+      for (flow::Node* one : tables_with_files(name, table))
+        if (const flow::Node* path = one->find("file"); path && !path->text.empty()) one->set("file", whole(std::filesystem::absolute(file.parent_path() / path->text).lexically_normal()));
     }
     loaded->resolved = importers::to_toml(resolved);
     loaded->key = state_key(resolved, *loaded->terrain, loaded->solids, *loaded->simulation);

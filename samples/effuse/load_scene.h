@@ -9,6 +9,8 @@
 #include "flow/scene/scene.h"
 #include "flow/scene/simulation.h"
 #include "geometry/terrain/terrain.h"
+#include "importers/read_apart.h"
+#include "samples/effuse/commands.h"
 #include "samples/effuse/solid_things.h"
 #include "skin/scene/skin_settings.h"
 
@@ -28,6 +30,10 @@ struct LoadedScene {
 
 /// Throws InputError with every fault of the scene, the terrain's file among them; nothing is written.
 /// overrides: key=value each; frames > 0 replaces film.frames.
-std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const std::vector<std::string>& overrides, int frames);
+/// limits: of its terrain's and meshes' files.
+std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const std::vector<std::string>& overrides, int frames, const importers::ReadLimits& limits = {true, 0, 0});
+
+/// As --read-limit says; files are read in processes of their own.
+importers::ReadLimits read_limits(const CommonOptions& common);
 
 }  // namespace effuse

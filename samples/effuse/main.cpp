@@ -92,6 +92,7 @@ void add_skin_options(CLI::App* verb, effuse::SkinCommand& skin) {
       ->check(CLI::IsMember({"none", "aa", "pahoehoe", "block", "obsidian", "noise"}));
   verb->add_option("--amplitude", skin.amplitude, "with --kind: half the height of its bumps where cold, in particle spacings (2 radii); 0: colours alone [0.25]")->check(CLI::Range(0.0, 10.0));
   verb->add_option("--edge", skin.edge, "with --kind: the mesh is refined to edges of so many particle spacings, 0.1 say for close-ups [the cube size]")->check(CLI::Range(0.05, 10.0));
+  verb->add_option("--oversample", skin.oversample, "with --kind: edges so many times shorter, with no finer bumps: triangles follow the bumps more closely, and change less from frame to frame; 4 for stills and slow shots [1]")->check(CLI::Range(1.0, 16.0));
   // Beyond what 64 bits hold it would be cut to that in silence.
   const CLI::Validator whole([](std::string& text) { return !text.empty() && text.size() <= 19 && text.find_first_not_of("0123456789") == std::string::npos ? "" : "must be a whole number of up to 19 digits"; }, "");
   verb->add_option("--seed", skin.seed, "with --kind: another one, other bumps [1]")->check(whole);
@@ -115,14 +116,14 @@ void add_skin_options(CLI::App* verb, effuse::SkinCommand& skin) {
   verb->footer("Exit codes: 0 done, 1 a check of the mesh failed, 2 wrong use or bad input, 5 out of disk or memory.");
   // Ranges let nan through.
   const CLI::Validator finite([](std::string& text) { return std::isfinite(std::strtod(text.c_str(), nullptr)) ? "" : "must be a finite number"; }, "");
-  for (const char* name : {"-r", "-l", "-c", "-t", "--drop-volume", "--coarsen", "--amplitude", "--edge", "--particle-aabb-min", "--particle-aabb-max"}) verb->get_option(name)->check(finite);
+  for (const char* name : {"-r", "-l", "-c", "-t", "--drop-volume", "--coarsen", "--amplitude", "--edge", "--oversample", "--particle-aabb-min", "--particle-aabb-max"}) verb->get_option(name)->check(finite);
 }
 
 void add_import_options(CLI::App* verb, effuse::ImportCommand& import) {
   verb->add_option("file", import.files, "a grid (GeoTIFF, ESRI ASCII, HGT, USGS DEM, flt, bil, XYZ, netCDF, PNG) or several as a mosaic, or a mesh")->required();
-  verb->add_option("-o,--output", import.output, "file to write: .tif .asc a grid; .ply .obj .glb .stl a mesh")->required();
-  verb->add_option("--max-error", import.max_error, "of the mesh of a grid: no post lies farther above or below it ('0.5 m'); absent: every post is a vertex");
-  verb->add_option("--crop", import.crop, "west south east north in the output's coordinates; of a grid in degrees, degrees do too")->expected(4)->delimiter(',');
+  verb->add_option("-o,--output", import.output, "file to write: .tif .asc a grid; .ply .obj .glb .stl .off a mesh")->required();
+  verb->add_option("--max-error", import.max_error, "fewer triangles: of a grid's mesh, no post lies farther above or below it ('0.5 m'); of a mesh, neither lies farther from the other; absent: every post, every triangle");
+  verb->add_option("--crop", import.crop, "west south east north in the output's map coordinates; of a grid in degrees, degrees do too")->expected(4)->delimiter(',');
   verb->add_option("--crs", import.crs, "coordinate system to work in, in metres: EPSG:32616, WKT, PROJ [the file's, or the UTM zone of one in degrees]");
   verb->add_option("--file-crs", import.file_crs, "what the file's coordinates are in, when it does not say or says it wrong");
   verb->add_option("--resample", import.resample, "distance between posts, method (auto, nearest, bilinear, cubic, average), or both: 10m,cubic [as the file has them]");
@@ -132,7 +133,13 @@ void add_import_options(CLI::App* verb, effuse::ImportCommand& import) {
   verb->add_option("--size", import.size, "of an image without a place: east-west north-south in metres, first post to last")->expected(2)->delimiter(',')->check(CLI::PositiveNumber);
   verb->add_option("--range", import.range, "of an image: heights in metres of its darkest and brightest values")->expected(2)->delimiter(',');
   verb->add_option("--max-posts", import.max_posts, "refuse more [50000000]")->check(CLI::Range(std::uint64_t{4}, std::uint64_t{4000000000}));
-  verb->add_option("--up", import.up, "of a mesh: its axis that points up [z]")->check(CLI::IsMember({"y", "z"}));
+  verb->add_flag("--on-map", import.on_map, "write positions as map coordinates, in all their digits, not relative to an origin: .ply .obj .off");
+  verb->add_option("--up", import.up, "of a mesh: its axis that points up [as the file says, or z]")->check(CLI::IsMember({"x", "y", "z"}));
+  verb->add_option("--units", import.units, "of a mesh's numbers: mm, cm, m, km, in, ft, us-ft, or metres of one [as the file says, or m]");
+  verb->add_flag("--keep", import.keep, "of a mesh: leave it as it is; absent: it is repaired (welded, wound one way, parted where it is not manifold, degenerate and duplicate triangles dropped)");
+  verb->add_option("--fill-holes", import.fill_holes, "of a mesh: fill holes up to this diagonal ('2 m'), or all [none]");
+  verb->add_option("--edge", import.edge, "of a mesh: new triangles with edges about so long ('2 m'); sharp edges and borders stay");
+  verb->add_option("--cell", import.cell, "of a grid made of a mesh: distance between its posts ('5 m')");
   verb->footer("Says what it found, assumed and changed. Exit codes: 0 done, 2 wrong use or bad input, 5 out of disk or memory.");
 }
 
@@ -166,6 +173,7 @@ int main(int argc, char** argv) {
     verb->add_flag("--json", common.json, "one JSON document on stdout, nothing else there");
     verb->add_flag("-q,--quiet", common.quiet, "no progress, no talk");
     verb->add_option("--threads", common.threads, "threads to use; all when absent")->check(CLI::Range(1, 1024));
+    verb->add_option("--read-limit", common.read_limit, "time and memory that reading one mesh or grid may take: 60s,4GB; absent: by the file's size");
     return verb;
   };
 
@@ -189,7 +197,7 @@ int main(int argc, char** argv) {
   info_verb->add_option("file", files, "files")->required();
 
   effuse::ImportCommand import;
-  CLI::App* import_verb = add_common(app.add_subcommand("import", "terrain as other programs want it: reprojected, cropped, resampled, filled; grids as meshes to a stated error"));
+  CLI::App* import_verb = add_common(app.add_subcommand("import", "terrain and meshes as other programs want them: reprojected, cropped, resampled, filled, repaired, simplified; grids as meshes to a stated error, meshes as grids"));
   add_import_options(import_verb, import);
 
   CLI::App* effects_verb = add_common(app.add_subcommand("effects", "the effects there are, and their parameters"));

@@ -227,7 +227,7 @@ bool go_on(const fs::path& folder, LoadedScene& loaded, FlowWriter& flow_writer,
 ExitCode run(const RunCommand& command, const CommonOptions& common) {
   Profile profile;
   const ProfileScope scope(profile);
-  const std::unique_ptr<LoadedScene> loaded = load_scene(command.scene, command.set, command.frames);
+  const std::unique_ptr<LoadedScene> loaded = load_scene(command.scene, command.set, command.frames, read_limits(common));
   const flow::Scene& scene = loaded->scene;
   flow::Simulation& simulation = *loaded->simulation;
   for (const std::string& note : loaded->notes) log_info("terrain: " + note);

@@ -18,8 +18,10 @@
 #include "importers/input_file.h"
 #include "importers/points/import_points.h"
 #include "importers/points/spacing.h"
+#include "importers/terrain/import_dem.h"
 #include "importers/terrain/import_terrain.h"
 #include "samples/effuse/commands.h"
+#include "samples/effuse/load_scene.h"
 #include "samples/effuse/first_positions.h"
 #include "skin/color/lava_color.h"
 #include "skin/surface/level_set.h"
@@ -279,8 +281,8 @@ skin::LevelSetOptions level_set_options(const SkinCommand& command, Real radius,
 std::optional<skin::DisplaceOptions> detail_options(const SkinCommand& command) {
   const auto kind = std::find(skin::kSkinKindNames.begin(), skin::kSkinKindNames.end(), command.kind);
   if (kind == skin::kSkinKindNames.end()) {
-    if (command.amplitude || command.edge || command.seed || !command.temperature.empty())
-      throw InputError(Place{}, "--amplitude, --edge, --seed and --temperature go with --kind: the smooth skin has no detail and no colour");
+    if (command.amplitude || command.edge || command.oversample || command.seed || !command.temperature.empty())
+      throw InputError(Place{}, "--amplitude, --edge, --oversample, --seed and --temperature go with --kind: the smooth skin has no detail and no colour");
     return std::nullopt;
   }
   if (std::all_of(command.meshes.begin(), command.meshes.end(), [](const fs::path& file) { return format_of(file) == Format::kVdb; }))
@@ -289,6 +291,7 @@ std::optional<skin::DisplaceOptions> detail_options(const SkinCommand& command) 
   detail.kind = static_cast<skin::SkinKind>(kind - skin::kSkinKindNames.begin());
   detail.amplitude = command.amplitude.value_or(detail.amplitude);
   detail.edge = command.edge.value_or(command.cube_size / 2);
+  detail.oversample = command.oversample.value_or(detail.oversample);
   detail.seed = command.seed.value_or(detail.seed);
   return detail;
 }
@@ -425,6 +428,17 @@ std::string to_text(const Check& check) {
                      check.self_intersections == 0 ? "no self-intersections" : fmt::format("{} pairs of triangles intersect", check.self_intersections), check.volume);
 }
 
+/// Ground in the file's own coordinates, which are to be the particles': the terrain.ply of a run lies where its particles are, not on
+/// the map.
+importers::TerrainImport import_ground(const fs::path& file, const CommonOptions& common) {
+  importers::TerrainImportOptions options;
+  options.mesh.limits = options.dem.limits = read_limits(common);
+  if (importers::is_dem(file)) return importers::import_terrain(file, options);
+  importers::MeshImport mesh = importers::import_mesh(file, options.mesh);
+  mesh.frame.origin = Vec3::Zero();
+  return importers::terrain_from_mesh(std::move(mesh), file.string(), options);
+}
+
 class Skinner {
  public:
   Skinner(const SkinCommand& command, const CommonOptions& common) : command_(command), common_(common) {
@@ -436,7 +450,7 @@ class Skinner {
     temperature_ = told_temperature(command);
     if (command.particle_radius > 0) radius_ = Radius{command.particle_radius, "--particle-radius"};
     if (!command.terrain.empty()) {
-      const importers::TerrainImport import = importers::import_terrain(command.terrain);
+      const importers::TerrainImport import = import_ground(command.terrain, common);
       for (const std::string& note : import.notes) tell_once(command.terrain, note);
       terrain_ = counted_from(import.terrain, origin_);
     }

@@ -7,6 +7,7 @@
 #include "geometry/base/check.h"
 #include "geometry/base/error.h"
 #include "geometry/procedural/primitives.h"
+#include "geometry/repair/repair.h"
 #include "importers/clips/read_bvh.h"
 #include "importers/mesh/import_mesh.h"
 #include "samples/effuse/solid_look.h"
@@ -21,11 +22,20 @@ bool has_form(const flow::PlannedForm& form) { return !form.file.empty() || form
 
 }  // namespace
 
-geometry::TriMesh load_form(const flow::PlannedForm& form, const std::filesystem::path& folder) {
+geometry::TriMesh load_form(const flow::PlannedForm& form, const SceneFiles& files, std::vector<std::string>& notes) {
   if (form.file.empty()) return flow::mesh_of(form);
-  const std::filesystem::path path = std::filesystem::path(form.file).is_relative() ? folder / form.file : std::filesystem::path(form.file);
+  const std::filesystem::path path = std::filesystem::path(form.file).is_relative() ? files.folder / form.file : std::filesystem::path(form.file);
   try {
-    return importers::import_mesh(path).mesh;
+    importers::MeshOptions options;
+    options.limits = files.limits;
+    geometry::TriMesh mesh = importers::import_mesh(path, options).mesh;
+    const geometry::RepairReport repairs = geometry::repair(mesh);
+    std::string told;
+    for (const std::string& line : geometry::to_lines(repairs)) told += (told.empty() ? "" : "; ") + line;
+    if (repairs.inward_shells > 0) told += fmt::format("{}{} inside, facing inward: room", told.empty() ? "" : "; ", repairs.inward_shells == 1 ? "a part" : "parts");
+    if (!told.empty()) notes.push_back(fmt::format("'{}': {}", form.name, told));
+    if (mesh.triangles.empty()) throw InputError({path.string()}, "holds no triangle with an area");
+    return mesh;
   } catch (const InputError& error) {
     std::vector<Fault> faults;
     for (const Fault& fault : error.faults()) faults.push_back({form.file_place, to_string(fault)});
@@ -33,14 +43,14 @@ geometry::TriMesh load_form(const flow::PlannedForm& form, const std::filesystem
   }
 }
 
-std::vector<flow::PlacedObstacle> load_obstacles(const flow::Scene& scene, const std::filesystem::path& folder, const geometry::Terrain& terrain, std::vector<Fault>& faults,
+std::vector<flow::PlacedObstacle> load_obstacles(const flow::Scene& scene, const SceneFiles& files, const geometry::Terrain& terrain, std::vector<Fault>& faults,
                                                  std::vector<std::string>& notes) {
   std::vector<flow::PlacedObstacle> placed;
   for (const flow::PlannedObstacle& plan : scene.obstacles) {
     if (!has_form(plan)) continue;
     try {
       const std::size_t before = placed.size();
-      flow::place_obstacle(plan, load_form(plan, folder), terrain, placed, faults);
+      flow::place_obstacle(plan, load_form(plan, files, notes), terrain, placed, faults);
       if (placed.size() > before) notes.push_back(fmt::format("obstacle '{}': {}", plan.name, geometry::to_string(placed.back().shape.report())));
     } catch (const InputError& error) {
       faults.insert(faults.end(), error.faults().begin(), error.faults().end());
@@ -49,12 +59,12 @@ std::vector<flow::PlacedObstacle> load_obstacles(const flow::Scene& scene, const
   return placed;
 }
 
-std::vector<flow::PlacedObstacle> load_figures(const flow::Scene& scene, const std::filesystem::path& folder, const geometry::Terrain& terrain, std::vector<Fault>& faults,
+std::vector<flow::PlacedObstacle> load_figures(const flow::Scene& scene, const SceneFiles& files, const geometry::Terrain& terrain, std::vector<Fault>& faults,
                                                std::vector<std::string>& notes) {
   std::vector<flow::PlacedObstacle> placed;
   for (const flow::PlannedFigure& plan : scene.figures) {
     if (plan.file.empty() || plan.path.size() < 2) continue;
-    const std::filesystem::path path = std::filesystem::path(plan.file).is_relative() ? folder / plan.file : std::filesystem::path(plan.file);
+    const std::filesystem::path path = std::filesystem::path(plan.file).is_relative() ? files.folder / plan.file : std::filesystem::path(plan.file);
     try {
       flow::place_figure(plan, importers::read_bvh(path, plan.scale), terrain, scene.frame_time(scene.frames), placed, faults, notes);
     } catch (const InputError& error) {
@@ -64,7 +74,7 @@ std::vector<flow::PlacedObstacle> load_figures(const flow::Scene& scene, const s
   return placed;
 }
 
-std::vector<flow::PlacedBody> load_bodies(const flow::Scene& scene, const std::filesystem::path& folder, const geometry::Terrain& terrain, std::vector<Fault>& faults,
+std::vector<flow::PlacedBody> load_bodies(const flow::Scene& scene, const SceneFiles& files, const geometry::Terrain& terrain, std::vector<Fault>& faults,
                                           std::vector<std::string>& notes) {
   std::vector<flow::PlacedBody> placed;
   std::string first;  // of those that are alike, by name
@@ -73,7 +83,7 @@ std::vector<flow::PlacedBody> load_bodies(const flow::Scene& scene, const std::f
     if (!has_form(plan)) continue;
     try {
       const std::size_t before = placed.size();
-      flow::place_body(plan, load_form(plan, folder), terrain, placed, faults);
+      flow::place_body(plan, load_form(plan, files, notes), terrain, placed, faults);
       if (placed.size() == before) continue;
       const std::string what = fmt::format("{:.4g} m3, {:.4g} kg{}", placed.back().volume, placed.back().volume * plan.density,
                                            placed.back().cells ? fmt::format(", {} cells, breaks at {:.4g} Pa", placed.back().cells->cells.size(), placed.back().strength) : "");
@@ -160,28 +170,23 @@ geometry::TriMesh SolidThings::at(Real time, const std::vector<geometry::RigidPo
   return all;
 }
 
-geometry::TriMesh for_picture(geometry::TriMesh mesh) {
-  const std::size_t numbers = 3 * mesh.positions.size();
-  std::erase_if(mesh.attributes, [&](const auto& each) { return (each.first != "color" && each.first != "glow") || each.second.values.size() != numbers; });
-  if (!mesh.attributes.contains("color")) mesh.attributes["color"] = {3, std::vector<float>(numbers, 0.25f)};
-  if (!mesh.attributes.contains("glow")) mesh.attributes["glow"] = {3, std::vector<float>(numbers, 0)};
-  return mesh;
-}
-
 geometry::TriMesh in_one_picture(geometry::TriMesh lava, const geometry::TriMesh& obstacles) {
   if (obstacles.triangles.empty()) return lava;
-  geometry::TriMesh cold = for_picture(obstacles);
+  geometry::TriMesh cold = obstacles;
   const std::size_t n = cold.positions.size();
-  if (lava.positions.empty()) return cold;
+  if (lava.positions.empty()) return obstacles;
+  // Only what the picture is made of goes on.
+  for (const char* name : {"piece", "inner"}) cold.attributes.erase(name);
   for (const auto& [name, attribute] : lava.attributes) {
-    if (cold.attributes.contains(name)) continue;
+    if (name == "color" || name == "water" || (name == "glow" && cold.attributes.contains("glow"))) continue;
     geometry::VertexAttribute& own = cold.attributes[name];
     own.width = attribute.width;
     own.values.assign(n * static_cast<std::size_t>(attribute.width), name == "temperature" ? kAir : name == "crust" ? 1 : 0.0f);
   }
+  if (cold.attributes.contains("glow") && !lava.attributes.contains("glow")) lava.attributes["glow"] = {3, std::vector<float>(3 * lava.positions.size(), 0.0f)};
+  if (cold.attributes.contains("water")) lava.attributes["water"] = {1, std::vector<float>(lava.positions.size(), 0.0f)};
   if (lava.normals.empty()) cold.normals.clear();
-  for (const char* name : {"color", "glow"})
-    if (!lava.attributes.contains(name)) cold.attributes.erase(name);
+  if (!lava.attributes.contains("color")) cold.attributes.erase("color");
   geometry::append(lava, cold);
   return lava;
 }

@@ -9,24 +9,32 @@
 #include "flow/scene/rigid_bodies.h"
 #include "flow/scene/scene.h"
 #include "geometry/mesh/tri_mesh.h"
+#include "importers/read_apart.h"
 #include "skin/scene/skin_settings.h"
 
 namespace effuse {
 
-/// The mesh that a form names, its file's relative to the scene's folder, or its box or ball. Throws InputError at the scene's line.
-geometry::TriMesh load_form(const flow::PlannedForm& form, const std::filesystem::path& folder);
+/// Where a scene's files lie, and what reading one may cost.
+struct SceneFiles {
+  std::filesystem::path folder;
+  importers::ReadLimits limits;
+};
+
+/// The mesh that a form names, its file's relative to the scene's folder and repaired (geometry/repair), or its box or ball. Throws
+/// InputError at the scene's line. notes: what was repaired.
+geometry::TriMesh load_form(const flow::PlannedForm& form, const SceneFiles& files, std::vector<std::string>& notes);
 
 /// Reads the meshes of a scene's obstacles, relative to its folder, and puts them on the terrain. What goes wrong is a fault at the
 /// line that names the file. notes: what was done to meshes on the way, a line each.
-std::vector<flow::PlacedObstacle> load_obstacles(const flow::Scene& scene, const std::filesystem::path& folder, const geometry::Terrain& terrain, std::vector<Fault>& faults,
+std::vector<flow::PlacedObstacle> load_obstacles(const flow::Scene& scene, const SceneFiles& files, const geometry::Terrain& terrain, std::vector<Fault>& faults,
                                                  std::vector<std::string>& notes);
 
 /// The same for its figures, whose bones are obstacles; to be put behind the scene's own.
-std::vector<flow::PlacedObstacle> load_figures(const flow::Scene& scene, const std::filesystem::path& folder, const geometry::Terrain& terrain, std::vector<Fault>& faults,
+std::vector<flow::PlacedObstacle> load_figures(const flow::Scene& scene, const SceneFiles& files, const geometry::Terrain& terrain, std::vector<Fault>& faults,
                                                std::vector<std::string>& notes);
 
 /// The same for its rigid bodies.
-std::vector<flow::PlacedBody> load_bodies(const flow::Scene& scene, const std::filesystem::path& folder, const geometry::Terrain& terrain, std::vector<Fault>& faults,
+std::vector<flow::PlacedBody> load_bodies(const flow::Scene& scene, const SceneFiles& files, const geometry::Terrain& terrain, std::vector<Fault>& faults,
                                           std::vector<std::string>& notes);
 
 /// Its joints, among obstacles and bodies of which none was left out.
@@ -57,10 +65,6 @@ struct SolidThings {
 
 /// Throws InputError where the picture's camera stands in an obstacle at a frame of the film. Bodies, which move as they will, are not asked.
 void check_camera_among(const SolidThings& things, const skin::SkinSettings& settings, const geometry::Terrain& terrain, const flow::Scene& scene);
-
-/// What a picture takes of a mesh that is not lava: "color", grey where it has none, and "glow", dark where it has none. Such meshes can be
-/// appended to one another.
-geometry::TriMesh for_picture(geometry::TriMesh mesh);
 
 /// Lava and other meshes for one picture: these cold and dull.
 geometry::TriMesh in_one_picture(geometry::TriMesh lava, const geometry::TriMesh& obstacles);

@@ -4,8 +4,10 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "geometry/base/files.h"
 #include "geometry/base/log.h"
 #include "samples/effuse/commands.h"
+#include "samples/study/page.h"
 #include "samples/study/run_study.h"
 #include "samples/study/study.h"
 
@@ -20,7 +22,12 @@ struct Study {
 
 std::vector<Study> studies() {
   return {{"validation", "the modern lava beside exact solutions, benchmarks and experiments", &study::validation_cases},
-          {"skin", "the skin of solids filled with particles beside the solids, its relief and colour; --full makes a sheet of close-ups", &study::skin_cases}};
+          {"skin", "the skin of solids filled with particles beside the solids, its relief and colour; --full makes a sheet of close-ups", &study::skin_cases},
+          {"integrators", "what a scheme and its step cost for the error they make, and where they blow up", &study::integrator_cases},
+          {"lava", "what the lava's spacing, support, step, tolerances and stiffness cost for the error they make", &study::lava_cases},
+          {"heat", "what the crust's cells cost, and what they buy", &study::heat_cases},
+          {"terrain", "what triangles of the ground cost, and where the lava goes on fewer", &study::terrain_cases},
+          {"solvers", "waves, rigid bodies, elastic solids: what grid, step and elements cost", &study::solver_cases}};
 }
 
 /// A log that nobody reads any more must not end a study.
@@ -65,9 +72,11 @@ ExitCode run_studies(const StudyCommand& command, const CommonOptions& common) {
 
   ExitCode code = ExitCode::kDone;
   nlohmann::ordered_json documents = nlohmann::ordered_json::array();
+  std::vector<study::Chapter> chapters;
   for (std::size_t s = 0; s < chosen.size(); ++s) {
     study::StudyOptions options;
     options.name = chosen[s].name;
+    options.what = chosen[s].what;
     options.version = EFFUSE_VERSION;
     options.folder = command.folder.empty() ? std::filesystem::path("out") / "study" : command.folder;
     options.full = command.full;
@@ -83,6 +92,10 @@ ExitCode run_studies(const StudyCommand& command, const CommonOptions& common) {
       else if (!outcome->failure.empty()) say(fmt::format("{}failed after {}: {}\n", head, study::duration_text(outcome->seconds), outcome->failure));
       else say(fmt::format("{}{} of {} figures hold, {}\n", head, outcome->result.measures.size() - study::tally({*outcome}).missed, outcome->result.measures.size(), study::duration_text(outcome->seconds)));
     });
+
+    chapters.push_back({options.name, options.what, report.outcomes, report.not_run});
+    // All of them on one page, from the second on; as it grows.
+    if (chapters.size() > 1) write_file(options.folder / "study.html", study::page_of("accuracy and what it costs", EFFUSE_VERSION, chapters));
 
     const study::Tally t = study::tally(report.outcomes);
     if (t.failed > 0 || (command.strict && t.missed > 0)) code = ExitCode::kFailed;

@@ -6,9 +6,10 @@
 namespace effuse {
 
 /// How the importers are to read the ground of a scene.
-inline importers::TerrainImportOptions terrain_options(const flow::TerrainSettings& s) {
+inline importers::TerrainImportOptions terrain_options(const flow::TerrainSettings& s, const importers::ReadLimits& limits = {}) {
   importers::TerrainImportOptions options;
   options.temperature = s.temperature;
+  options.mesh.limits = options.dem.limits = limits;
   importers::DemOptions& dem = options.dem;
   dem.crs = s.crs;
   dem.file_crs = s.file_crs;

@@ -50,6 +50,11 @@ ordered_json measure_json(const Measure& m) {
           {"error", number(m.error)}, {"hold", number(m.hold)}, {"error_unit", m.unit_of_error}, {"passed", m.passed()}};
 }
 
+ordered_json cost_json(const CostPoint& p) {
+  return {{"curve", p.curve},     {"setting", p.setting}, {"parameter", number(p.parameter)}, {"error", number(p.error)}, {"seconds", number(p.seconds)}, {"spread", number(p.spread)},
+          {"repeats", p.repeats}, {"steps", p.steps},     {"memory_bytes", p.memory},         {"hash", fmt::format("{:016x}", p.hash)}};
+}
+
 /// Text as JSON holds it: bytes that are not UTF-8 become U+FFFD.
 std::string dumped(const ordered_json& j) { return j.dump(1, ' ', false, ordered_json::error_handler_t::replace); }
 
@@ -103,7 +108,7 @@ std::string duration_text(double seconds) {
 
 std::string outcome_json(const Outcome& outcome) {
   ordered_json j;
-  j["format"] = 1;
+  j["format"] = 2;
   j["case"] = outcome.name;
   j["title"] = outcome.title;
   j["source"] = outcome.source;
@@ -113,6 +118,8 @@ std::string outcome_json(const Outcome& outcome) {
   j["note"] = outcome.result.note;
   j["measures"] = ordered_json::array();
   for (const Measure& m : outcome.result.measures) j["measures"].push_back(measure_json(m));
+  j["costs"] = ordered_json::array();
+  for (const CostPoint& p : outcome.result.costs) j["costs"].push_back(cost_json(p));
   j["plots"] = ordered_json::array();
   for (const Plot& plot : outcome.result.plots) {
     ordered_json curves = ordered_json::array();
@@ -125,7 +132,7 @@ std::string outcome_json(const Outcome& outcome) {
 Outcome read_outcome(const std::string& json, const std::string& file) {
   try {
     const ordered_json j = ordered_json::parse(json);
-    if (j.at("format").get<int>() != 1) throw std::runtime_error("format is not 1");
+    if (j.at("format").get<int>() != 2) throw std::runtime_error("format is not 2");
     Outcome outcome;
     outcome.name = j.at("case").get<std::string>();
     outcome.title = j.at("title").get<std::string>();
@@ -138,6 +145,9 @@ Outcome read_outcome(const std::string& json, const std::string& file) {
     for (const ordered_json& m : j.at("measures"))
       outcome.result.measures.push_back({m.at("what").get<std::string>(), m.at("unit").get<std::string>(), number_from(m.at("measured")), number_from(m.at("reference")), number_from(m.at("error")),
                                          number_from(m.at("hold")), m.at("error_unit").get<std::string>()});
+    for (const ordered_json& p : j.at("costs"))
+      outcome.result.costs.push_back({p.at("curve").get<std::string>(), p.at("setting").get<std::string>(), number_from(p.at("parameter")), number_from(p.at("error")), number_from(p.at("seconds")), number_from(p.at("spread")),
+                                      p.at("repeats").get<int>(), p.at("steps").get<std::uint64_t>(), p.at("memory_bytes").get<std::size_t>(), std::stoull(p.at("hash").get<std::string>(), nullptr, 16)});
     for (const ordered_json& p : j.at("plots")) {
       Plot plot{p.at("file").get<std::string>(), p.at("title").get<std::string>(), p.at("x_label").get<std::string>(), p.at("y_label").get<std::string>(), p.at("log_x").get<bool>(), p.at("log_y").get<bool>(), {}};
       for (const ordered_json& c : p.at("curves")) {
@@ -168,6 +178,15 @@ std::string table_csv(const std::vector<Outcome>& outcomes) {
              "," + tail;
   }
   return out;
+}
+
+std::string costs_csv(const std::vector<Outcome>& outcomes) {
+  std::string rows;
+  for (const Outcome& outcome : outcomes)
+    for (const CostPoint& p : outcome.result.costs)
+      rows += fmt::format("{},{},{},{},{},{},{},{},{},{},{:016x},{}\n", csv_cell(outcome.name), csv_cell(p.curve), csv_cell(p.setting), csv_number(p.parameter), csv_number(p.error), csv_number(p.seconds), csv_number(p.spread), p.repeats,
+                          p.steps, p.memory, p.hash, csv_cell(outcome.version));
+  return rows.empty() ? "" : "case,curve,setting,parameter,error,seconds,spread,repeats,steps,memory_bytes,hash,version\n" + rows;
 }
 
 std::string table_json(const std::string& study, const std::string& version, const std::vector<Outcome>& outcomes, const std::vector<std::string>& not_run) {

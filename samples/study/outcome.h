@@ -46,6 +46,10 @@ Outcome read_outcome(const std::string& json, const std::string& file);
 /// error_unit "" is a share; result passed, missed or failed; short_by = error - hold where missed.
 std::string table_csv(const std::vector<Outcome>& outcomes);
 
+/// What each run of each case cost, columns case,curve,setting,parameter,error,seconds,spread,repeats,steps,memory_bytes,hash,version; "" when
+/// no case has any.
+std::string costs_csv(const std::vector<Outcome>& outcomes);
+
 /// The same as one JSON document: study, version, threads, summary's numbers, and of each case its measures and plot names.
 std::string table_json(const std::string& study, const std::string& version, const std::vector<Outcome>& outcomes, const std::vector<std::string>& not_run);
 

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "geometry/base/parallel.h"
 #include "samples/study/drawing.h"
 #include "samples/study/plot.h"
@@ -13,7 +15,7 @@ namespace {
 constexpr const char* kStyle = R"(:root{color-scheme:light dark;--page:#fff;--text:#202020;--quiet:#5c5c5c;--line:#d0d0d0;--band:#f5f5f5;--good:#00694d;--bad:#b00020;--link:#00588c}
 @media (prefers-color-scheme:dark){:root{--page:#161616;--text:#e6e6e6;--quiet:#a6a6a6;--line:#3a3a3a;--band:#202020;--good:#4fd3a8;--bad:#ff8a93;--link:#7cc4f5}}
 body{margin:0 auto;max-width:92rem;padding:1.5rem;background:var(--page);color:var(--text);font:16px/1.5 system-ui,'DejaVu Sans',sans-serif}
-h1{font-size:1.6rem;margin:0 0 .3rem}h2{font-size:1.2rem;margin:2.5rem 0 .3rem}
+h1{font-size:1.6rem;margin:0 0 .3rem}h2{font-size:1.35rem;margin:3rem 0 .3rem}h3{font-size:1.15rem;margin:2.2rem 0 .3rem}details{margin:.6rem 0}summary{cursor:pointer;color:var(--quiet)}
 p{margin:.3rem 0;max-width:60rem}.quiet{color:var(--quiet);font-size:.9rem}a{color:var(--link)}
 .table{overflow-x:auto;margin:1.2rem 0}
 table{border-collapse:collapse;font-size:.875rem}
@@ -53,28 +55,53 @@ std::string rows_of(const Outcome& outcome) {
   return out;
 }
 
-}  // namespace
+/// What the runs cost, folded away.
+std::string costs_of(const Outcome& outcome) {
+  if (outcome.result.costs.empty()) return "";
+  std::string out = fmt::format("<details><summary>{} runs: error, seconds, memory, steps, state</summary>\n<div class=\"table\"><table>\n<thead><tr><th>curve</th><th>setting</th><th class=\"n\">error</th><th class=\"n\">seconds</th>"
+                                "<th class=\"n\">± (of)</th><th class=\"n\">steps</th><th class=\"n\">memory</th><th>state</th></tr></thead>\n<tbody>\n", outcome.result.costs.size());
+  for (const CostPoint& p : outcome.result.costs)
+    out += fmt::format("<tr><td>{}</td><td>{}</td><td class=\"n\">{}</td><td class=\"n\">{:.3g}</td><td class=\"n\">{:.1g} ({})</td><td class=\"n\">{}</td><td class=\"n\">{:.3g} MB</td><td>{:016x}</td></tr>\n", escaped(p.curve),
+                       escaped(p.setting), std::isfinite(p.error) ? fmt::format("{:.3g}", p.error) : "blew up", p.seconds, p.spread, p.repeats, p.steps, static_cast<double>(p.memory) / 1e6, p.hash);
+  return out + "</tbody></table></div></details>\n";
+}
 
-std::string page_of(const std::string& study, const std::string& version, const std::vector<Outcome>& outcomes, const std::vector<std::string>& not_run) {
-  std::string out = fmt::format(
-      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-      "<title>effuse: {}</title>\n<style>\n{}{}</style>\n</head>\n<body>\n<h1>effuse {}: {}</h1>\n<p>{}.</p>\n",
-      escaped(study), kStyle, svg_style(), escaped(version), escaped(study), escaped(summary(outcomes)));
-  out += fmt::format("<p class=\"quiet\">Each figure beside an exact, converged or measured reference. A figure passes when its error is at most what it is held to. Times on {} {}.</p>\n", thread_count(), thread_count() == 1 ? "thread" : "threads");
-  if (!not_run.empty()) {
+std::string chapter_of(const Chapter& chapter) {
+  std::string out = fmt::format("<p>{}.</p>\n", escaped(summary(chapter.outcomes)));
+  if (!chapter.not_run.empty()) {
     std::string names;
-    for (const std::string& name : not_run) names += (names.empty() ? "" : ", ") + name;
+    for (const std::string& name : chapter.not_run) names += (names.empty() ? "" : ", ") + name;
     out += fmt::format("<p class=\"quiet\">Not run here: {}.</p>\n", escaped(names));
   }
   out += "<div class=\"table\"><table>\n<thead><tr><th>case</th><th>figure</th><th class=\"n\">measured</th><th class=\"n\">reference</th><th class=\"n\">error</th><th class=\"n\">hold to</th><th>result</th>"
          "<th class=\"n\">time</th><th>version</th><th>note</th></tr></thead>\n<tbody>\n";
-  for (const Outcome& outcome : outcomes) out += rows_of(outcome);
+  for (const Outcome& outcome : chapter.outcomes) out += rows_of(outcome);
   out += "</tbody></table></div>\n";
-  for (const Outcome& outcome : outcomes) {
-    out += fmt::format("<section id=\"case-{}\">\n<h2>{}</h2>\n<p class=\"quiet\">{} · reference: {}</p>\n", escaped(outcome.name), escaped(outcome.title), escaped(outcome.name), escaped(outcome.source));
+  for (const Outcome& outcome : chapter.outcomes) {
+    out += fmt::format("<section id=\"case-{}\">\n<h3>{}</h3>\n<p class=\"quiet\">{} · reference: {}</p>\n", escaped(outcome.name), escaped(outcome.title), escaped(outcome.name), escaped(outcome.source));
     if (!outcome.failure.empty()) out += fmt::format("<p class=\"bad\">✗ failed: {}</p>\n", escaped(outcome.failure));
     if (!outcome.result.note.empty()) out += fmt::format("<p>{}</p>\n", escaped(outcome.result.note));
-    out += plots_of(outcome) + "</section>\n";
+    out += plots_of(outcome) + costs_of(outcome) + "</section>\n";
+  }
+  return out;
+}
+
+}  // namespace
+
+std::string page_of(const std::string& title, const std::string& version, const std::vector<Chapter>& chapters) {
+  std::string out = fmt::format(
+      "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
+      "<title>effuse: {}</title>\n<style>\n{}{}</style>\n</head>\n<body>\n<h1>effuse {}: {}</h1>\n",
+      escaped(title), kStyle, svg_style(), escaped(version), escaped(title));
+  out += fmt::format("<p class=\"quiet\">Each figure beside an exact, converged or measured reference. A figure passes when its error is at most what it is held to. Times on {} {}.</p>\n", thread_count(), thread_count() == 1 ? "thread" : "threads");
+  if (chapters.size() > 1) {
+    out += "<ul>\n";
+    for (const Chapter& chapter : chapters) out += fmt::format("<li><a href=\"#study-{}\">{}</a>: {}</li>\n", escaped(chapter.name), escaped(chapter.name), escaped(chapter.what));
+    out += "</ul>\n";
+  }
+  for (const Chapter& chapter : chapters) {
+    if (chapters.size() > 1) out += fmt::format("<h2 id=\"study-{}\">{}</h2>\n<p>{}</p>\n", escaped(chapter.name), escaped(chapter.name), escaped(chapter.what));
+    out += chapter_of(chapter);
   }
   return out + "</body>\n</html>\n";
 }

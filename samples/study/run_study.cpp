@@ -64,15 +64,15 @@ std::optional<Outcome> earlier(const Case& c, const StudyOptions& options) {
   }
 }
 
-Outcome run_case(const Case& c, const std::string& version, const std::map<std::string, std::string>& owner) {
+Outcome run_case(const Case& c, const StudyOptions& options, const std::map<std::string, std::string>& owner) {
   Outcome outcome;
   outcome.name = c.name;
   outcome.title = c.title;
   outcome.source = c.source;
-  outcome.version = version;
+  outcome.version = options.version;
   const auto start = std::chrono::steady_clock::now();
   try {
-    outcome.result = c.run();
+    outcome.result = options.full && c.run_full ? c.run_full() : c.run();
     check_plots(outcome, owner);
   } catch (const std::exception& error) {
     outcome.failure = *error.what() ? error.what() : "an error without words";
@@ -96,7 +96,8 @@ void write_pictures(const StudyOptions& options, const Outcome& outcome) {
 void write_tables(const StudyOptions& options, const StudyReport& report) {
   write_file(options.folder / (options.name + ".csv"), table_csv(report.outcomes));
   write_file(options.folder / (options.name + ".json"), table_json(options.name, options.version, report.outcomes, report.not_run) + "\n");
-  write_file(options.folder / (options.name + ".html"), page_of(options.name, options.version, report.outcomes, report.not_run));
+  if (const std::string costs = costs_csv(report.outcomes); !costs.empty()) write_file(options.folder / (options.name + "-costs.csv"), costs);
+  write_file(options.folder / (options.name + ".html"), page_of(options.name, options.version, {{options.name, options.what, report.outcomes, report.not_run}}));
 }
 
 void make_folder(const fs::path& folder) {
@@ -152,7 +153,7 @@ StudyReport run_study(const std::vector<Case>& cases, const StudyOptions& option
   for (std::size_t n = 0; n < wanted.size(); ++n) {
     const Case& c = cases[wanted[n]];
     progress(n + 1, wanted.size(), c, nullptr);
-    Outcome outcome = run_case(c, options.version, owner);
+    Outcome outcome = run_case(c, options, owner);
     for (const Plot& plot : outcome.result.plots) owner.emplace(plot.file, c.name);
     write_pictures(options, outcome);
     write_file(result_file(options.folder, c.name), outcome_json(outcome));

@@ -11,9 +11,10 @@ namespace effuse::study {
 
 struct StudyOptions {
   std::string name = "validation";  ///< of the study: of its page and tables
+  std::string what = "";            ///< of the study, for its page: "the modern lava beside exact solutions"
   std::string version;              ///< of effuse: results of another one are never kept
   std::filesystem::path folder;
-  bool full = false;                ///< the slow cases too
+  bool full = false;                ///< the slow cases too, and the long version of those that have one
   bool resume = false;              ///< keep what the folder holds
   std::vector<std::string> only;    ///< these cases, quick or not; empty: all, or all quick ones
   double picture_scale = 2;         ///< of the PNGs: 1 is 760 pixels wide
@@ -31,6 +32,7 @@ using StudyProgress = std::function<void(std::size_t k, std::size_t n, const Cas
 ///
 ///   NAME.html          the page (page.h)
 ///   NAME.csv, .json    its table (outcome.h)
+///   NAME-costs.csv     what each run cost, if any tells
 ///   plots/FILE.svg, .png, .csv   of each plot of each case (plot.h)
 ///   pictures/FILE      of each picture of each case
 ///   cases/CASE.json    what --resume reads

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
@@ -40,10 +41,24 @@ struct Picture {
   std::string bytes;
 };
 
+/// One run at one setting: what it cost, and how wrong it was against an exact or converged reference.
+struct CostPoint {
+  std::string curve;        ///< points of one curve belong together: "rk4"
+  std::string setting;      ///< "dt = 1 ms"
+  double parameter = 0;     ///< what the setting is a number of: a step, a spacing, a tolerance
+  double error = 0;         ///< not finite: it blew up
+  double seconds = 0, spread = 0;  ///< of processor time, median of the repeats, and half their range
+  int repeats = 0;
+  std::uint64_t steps = 0;
+  std::size_t memory = 0;   ///< bytes of the solver's state
+  std::uint64_t hash = 0;   ///< of the state at the end
+};
+
 struct CaseResult {
   std::vector<Measure> measures;
   std::vector<Plot> plots;   ///< the first one is the case's own: measured beside reference
   std::vector<Picture> pictures;  ///< for the study's folder pictures/; not kept in the result's JSON
+  std::vector<CostPoint> costs;   ///< for NAME-costs.csv
   std::string note;          ///< resolution, method, what was left out; one or two sentences
 };
 
@@ -53,12 +68,20 @@ struct Case {
   std::string source;   ///< of the reference
   bool quick = false;   ///< a few seconds at most: run in the quick tests
   std::function<CaseResult()> run;
+  std::function<CaseResult()> run_full = {};  ///< the real thing where `run` is a short version, for `--full`; empty: there is no other
 };
 
 /// All cases of the validation set, in the order of the page.
 std::vector<Case> validation_cases();
 /// All cases of the skin: its surface beside solids, its relief, its colour, its pictures.
 std::vector<Case> skin_cases();
+
+// What accuracy costs in time; each in its own file under cost/.
+std::vector<Case> integrator_cases();  ///< scheme and step: oscillator, pendulum, orbit, jello
+std::vector<Case> lava_cases();        ///< spacing, stiffness, tolerances, support, step
+std::vector<Case> heat_cases();        ///< cells of the crust
+std::vector<Case> terrain_cases();     ///< triangles of the ground
+std::vector<Case> solver_cases();      ///< waves, bodies, elastic solids
 
 // By subject; each in its own file under validation/.
 void add_operator_cases(std::vector<Case>& cases);   // operators alone

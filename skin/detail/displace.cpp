@@ -125,6 +125,7 @@ void check(const DisplaceOptions& o) {
   CHECK_GE(o.fold_wavelength, 0.0);
   CHECK_GE(o.fold_time, 0.0);
   CHECK_GT(o.edge, 0.0);
+  CHECK_GE(o.oversample, 1.0);
   CHECK(o.rest_ratio >= 0 && o.rest_ratio <= 1);
 }
 
@@ -189,8 +190,9 @@ DisplaceReport displace_by_relief(TriMesh& mesh, const geometry::Points& points,
 
 RefineOptions fineness(const DisplaceOptions& o) {
   RefineOptions fine;
-  fine.edge = kTooCoarse * o.edge * o.spacing;
+  fine.edge = kTooCoarse * o.edge * o.spacing / o.oversample;
   fine.view = o.view;
+  if (fine.view) fine.view->pixels /= o.oversample;
   return fine;
 }
 
@@ -202,7 +204,7 @@ RefineToReport refine_for(TriMesh& mesh, const DisplaceOptions& o) {
   std::iota(report.parent.begin(), report.parent.end(), Index{0});
   // A dual mesh's mean edge is 1.1 to 1.2 of its voxel: refined only when clearly too coarse, so that frames agree.
   constexpr int kMostRefined = 3;
-  for (Real edge = mean_edge(mesh); edge > kTooCoarse * o.edge * o.spacing && report.rounds < kMostRefined; edge /= 2, ++report.rounds) {
+  for (Real edge = mean_edge(mesh); edge > kTooCoarse * o.edge * o.spacing / o.oversample && report.rounds < kMostRefined; edge /= 2, ++report.rounds) {
     mesh = refine(mesh);
     std::vector<Index> parent(mesh.triangles.size());
     for (std::size_t t = 0; t < parent.size(); ++t) parent[t] = report.parent[t / 4];  // each triangle's four follow one another

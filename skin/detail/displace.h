@@ -37,6 +37,7 @@ struct DisplaceOptions {
   Real fold_wavelength = 0; ///< [spacings] of folds; 0: the kind's own, 1.1 for pahoehoe, 2.4 for obsidian
   Real fold_time = 10;      ///< [s] in which the strain rate of the moment folds the surface
   Real edge = 0.5;          ///< [spacings] the edge length wanted: coarser meshes are refined, octaves finer than two edges left out
+  Real oversample = 1;      ///< >= 1: edges so many times shorter than that, and no more octaves: triangles follow the bumps so much more closely
   std::optional<View> view; ///< with one, edges are as long as view.pixels of its pixels where that is more than `edge`
   Real rest_ratio = 0;      ///< of Points: detail = (1 - rest_ratio) f(rest) + rest_ratio f(rest2)
   std::uint64_t seed = 1;
@@ -67,7 +68,7 @@ DisplaceReport displace(geometry::TriMesh& mesh, const geometry::Terrain* terrai
 /// The same for a skin whose particles are at hand: the mesh is refined along a smooth surface through its vertices
 /// and normals (refine.h), then moved by the Relief of the kind asked for (relief.h), which is a function of the particles and the
 /// place alone: two meshes of one surface are moved alike. kNoise: as above. Bounds and fades as above.
-/// Edges longer than 1.7 times `edge` are cut. 10 us a vertex and thread, all told.
+/// Edges longer than 1.7 times `edge` / `oversample` are cut. 10 us a vertex and thread, all told.
 ///   points   those that the mesh is the skin of
 DisplaceReport displace(geometry::TriMesh& mesh, const geometry::Points& points, const geometry::Terrain* terrain,
                         const DisplaceOptions& options);

@@ -192,8 +192,8 @@ Ground build_ground(const TriMesh& terrain) {
   geometry::compute_normals(bare);
   for (int pass = 0; pass < 2; ++pass) smooth_normals(bare, bare.normals);
 
-  // The floor: two triangles just under the apron, for what the apron leaves open.
-  const Real side = 100 * static_cast<Real>(ground.radius), z = base - 0.01 * static_cast<Real>(ground.radius);
+  // The floor: two triangles just under the apron, for what the apron leaves open, and under any hollow of the terrain.
+  const Real side = 100 * static_cast<Real>(ground.radius), z = std::min(base, static_cast<Real>(ground.low)) - 0.01 * static_cast<Real>(ground.radius);
   const Index first = static_cast<Index>(bare.positions.size());
   for (const auto& [x, y] : {std::pair{-side, -side}, {side, -side}, {side, side}, {-side, side}}) {
     bare.positions.emplace_back(x, y, z);

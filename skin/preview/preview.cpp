@@ -12,6 +12,7 @@
 #include "geometry/base/random.h"
 #include "geometry/base/zones.h"
 #include "skin/color/lava_color.h"
+#include "skin/preview/air.h"
 #include "skin/preview/bloom.h"
 #include "skin/preview/glow_field.h"
 #include "skin/preview/ground.h"
@@ -137,6 +138,7 @@ std::vector<float> sky_visibility(RTCScene scene, const Ground& ground) {
 /// The lava of one picture, in the ground's frame.
 struct Lava {
   std::vector<Vec3f> positions, normals, reflected, glow;
+  std::vector<float> water;  // [m] one sees into it; 0: rock. Empty: no water anywhere
   std::vector<float> fresh;  // 0 cold or crusted .. 1 molten film
   std::span<const geometry::Triangle> triangles;
 };
@@ -160,6 +162,7 @@ Lava take_lava(const TriMesh& mesh, const Vec3& origin) {
   };
   const std::vector<float>*temperature = scalar("temperature"), *crust = scalar("crust");
   lava.fresh.assign(n, 0.0f);
+  if (const std::vector<float>* water = scalar("water")) lava.water = *water;
   parallel_for(n, [&](std::size_t i) {
     lava.positions[i] = (mesh.positions[i] - origin).cast<float>();
     lava.normals[i] = normals[i].cast<float>();
@@ -174,12 +177,31 @@ Lava take_lava(const TriMesh& mesh, const Vec3& origin) {
   return lava;
 }
 
+/// Light of the lava and of what glows in the air: of each speck a triangle as wide as its disk.
+GlowField glow_of(const Lava& lava, const Air& air, const Vec3& origin, const GlowField::Surroundings& surroundings) {
+  constexpr float kCorner = 1.5551f;  // [radii] of a triangle of a disk's area from its middle
+  std::vector<Vec3f> positions(lava.positions), glow(lava.glow);
+  std::vector<geometry::Triangle> triangles(lava.triangles.begin(), lava.triangles.end());
+  for (const Speck& s : air.specks) {
+    if (s.glow.isZero()) continue;
+    const auto first = static_cast<Index>(positions.size());
+    triangles.push_back({first, first + 1, first + 2});
+    for (int k = 0; k < 3; ++k) {
+      const float turn = 2 * static_cast<float>(kPi) * static_cast<float>(k) / 3, r = kCorner * static_cast<float>(s.radius);
+      positions.push_back((s.position - origin).cast<float>() + r * Vec3f(std::cos(turn), std::sin(turn), 0));
+      glow.push_back(s.glow.cast<float>() * static_cast<float>(s.opacity));
+    }
+  }
+  return GlowField(positions, triangles, glow, surroundings);
+}
+
 /// What a sample sees, before it is known whether the sun reaches it.
 struct Surface {
   bool hit = false, is_lava = false;
   Vec3f position, normal, albedo, emission;
   Vec3f geometric;  ///< the triangle's normal, towards the viewer
   float distance = 0, sky = 1, gloss = 0;
+  float water = 0;  ///< [m] one sees into it
 };
 
 /// Rays of the picture: where sample s of pixel (x, y) goes.
@@ -200,6 +222,7 @@ class Lens {
     pixel_angle_ = static_cast<float>(2 * tangent / options.height);
   }
   const Vec3f& eye() const { return eye_; }
+  AirView view(const Vec3& origin) const { return {origin, eye_, forward_, right_, up_, pixel_angle_}; }
   /// Size of a pixel at a distance of 1.
   float pixel_angle() const { return pixel_angle_; }
   Vec3f direction(int x, int y, int s) const {
@@ -270,10 +293,13 @@ struct Picture {
   }
 
   Surface surface_at(unsigned id, unsigned primitive, float u, float v, float distance, const Vec3f& d, Vec3f geometric) const {
+    return surface_at(id, primitive, u, v, lens.eye() + distance * d, distance, d, geometric);
+  }
+  Surface surface_at(unsigned id, unsigned primitive, float u, float v, const Vec3f& position, float distance, const Vec3f& d, Vec3f geometric) const {
     Surface s;
     s.hit = true;
     s.distance = distance;
-    s.position = lens.eye() + distance * d;
+    s.position = position;
     geometric.normalize();
     s.geometric = geometric.dot(d) > 0 ? Vec3f(-geometric) : geometric;
     if (id == kLavaId) {
@@ -285,6 +311,7 @@ struct Picture {
       s.gloss = std::max(static_cast<float>(options.gloss), kMoltenGloss * at_hit(lava.fresh, t, u, v));
       s.normal = s.normal.squaredNorm() > 1e-8f ? s.normal.normalized() : s.geometric;
       if (geometric.dot(d) > 0) s.normal = -s.normal;  // seen from behind
+      if (!lava.water.empty()) s.water = at_hit(lava.water, t, u, v);
     } else {
       const geometry::Triangle& t = ground.triangles[primitive];
       const Vec3f normal = at_hit(ground.normals, t, u, v);
@@ -323,14 +350,74 @@ struct Picture {
       light += (0.3f * fresnel * saturate(0.4f + mirrored.z())) * reflection;
       light += s.emission;
     }
-    // Air between.
-    const float thickness = s.distance * static_cast<float>(options.haze) / (9 * ground.radius);
+    return through_air(s.distance, d, light);
+  }
+
+  /// Air between.
+  Vec3f through_air(float distance, const Vec3f& d, const Vec3f& light) const {
+    const float thickness = distance * static_cast<float>(options.haze) / (9 * ground.radius);
     const float clear = std::exp(-thickness * std::sqrt(thickness));  // clear before, closed behind
     return mix(sky.haze(d), light, clear);
   }
 
+  /// What a ray from p along d meets, and how far away; not hit: the sky. s.distance counts from the eye, by way of p.
+  Surface second(const Vec3f& p, const Vec3f& d, float before, float lift, float& way) const {
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    RTCRayHit hit{};
+    hit.ray.org_x = p.x(), hit.ray.org_y = p.y(), hit.ray.org_z = p.z();
+    hit.ray.dir_x = d.x(), hit.ray.dir_y = d.y(), hit.ray.dir_z = d.z();
+    hit.ray.tnear = lift;
+    hit.ray.tfar = kFar;
+    hit.ray.mask = ~0u;
+    hit.hit.geomID = hit.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    rtcIntersect1(ground_scene, &context, &hit);
+    rtcIntersect1(lava_scene, &context, &hit);
+    way = hit.ray.tfar;
+    if (hit.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
+    return surface_at(hit.hit.geomID, hit.hit.primID, hit.hit.u, hit.hit.v, p + way * d, before + way, d, Vec3f(hit.hit.Ng_x, hit.hit.Ng_y, hit.hit.Ng_z));
+  }
+
+  /// Water: Fresnel's mirror of one bounce, and down through it what lies there, red fading first; the body's own colour by the light
+  /// that falls in.
+  Vec3f water_light(const Surface& s, const Vec3f& d, bool lit) const {
+    // Smooth normals lean away from the viewer at a crest's edge: they are turned back until it is seen at a slant.
+    constexpr float kSlant = 0.03f;
+    Vec3f n = s.normal;
+    if (const float away = n.dot(d) + kSlant; away > 0) n = (n - away * d).normalized();
+    const float lift = 1e-4f * s.distance + 1e-4f * ground.radius, cosine = saturate(-n.dot(d));
+    const float out = 1 - cosine, o2 = out * out, fresnel = 0.02f + 0.98f * o2 * o2 * out;
+    float way = 0;
+    Vec3f mirrored = d - 2 * d.dot(n) * n;
+    mirrored.z() = std::max(mirrored.z(), 0.02f);
+    mirrored.normalize();
+    const Surface above = second(s.position + lift * s.geometric, mirrored, s.distance, lift, way);
+    const Vec3f body = s.albedo.cwiseProduct(sky.ambient(Vec3f::UnitZ()) + (lit ? 0.5f : 0.0f) * std::max(0.0f, sky.sun_direction().z()) * sky.sun_light() / static_cast<float>(kPi));
+    // Other waves show the sky, too, from higher up.
+    Vec3f onward = mirrored;
+    onward.z() += 0.25f;
+    const Vec3f reflection = !above.hit ? sky.radiance(mirrored) : above.water > 0 ? Vec3f(mix(body, sky.radiance(onward.normalized()), 0.7f)) : radiance(above, mirrored, true);
+    // Snell's law, air to water.
+    const float eta = 1 / 1.33f, inner = std::sqrt(std::max(0.0f, 1 - eta * eta * (1 - cosine * cosine)));
+    const Vec3f down = (eta * d + (eta * cosine - inner) * n).normalized();
+    const Surface below = second(s.position - lift * s.geometric, down, s.distance, lift, way);
+    Vec3f seen = body;
+    if (below.hit && below.water <= 0) {
+      const Vec3f through = (Vec3f(1.9f, 0.95f, 0.8f) * (-way / s.water)).array().exp();
+      seen = through.cwiseProduct(radiance(below, down, true)) + (Vec3f::Ones() - through).cwiseProduct(body);
+    }
+    Vec3f light = mix(seen, reflection, fresnel);
+    if (lit) {
+      // The sun, on ripples that the mesh does not have.
+      const Vec3f half = (sky.sun_direction() - d).normalized();
+      const float h = std::max(0.0f, n.dot(half)), alpha2 = 0.003f, q = h * h * (alpha2 - 1) + 1;
+      light += sky.sun_light() * (0.08f * fresnel * alpha2 / (static_cast<float>(kPi) * q * q));
+    }
+    return through_air(s.distance, d, light);
+  }
+
   /// Pixels [x0, x1) of row y, eight samples at a time.
-  void render_span(int y, int x0, int x1, float* rgb) const {
+  void render_span(int y, int x0, int x1, float* rgb, float* depth) const {
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
@@ -382,7 +469,11 @@ struct Picture {
         const Surface& s = surface[static_cast<std::size_t>(k)];
         const Vec3f& d = direction[static_cast<std::size_t>(k)];
         const bool lit = to_lava[k] != 0 && !(lava_shadow.tfar[k] < 0);
-        const Vec3f light = s.hit ? radiance(s, d, lit) : sky.radiance(d);
+        const Vec3f light = !s.hit ? sky.radiance(d) : s.water > 0 ? water_light(s, d, lit) : radiance(s, d, lit);
+        if (depth && s.hit) {
+          depth[2 * ((first + k) / samples)] += s.distance;
+          depth[2 * ((first + k) / samples) + 1] += 1;
+        }
         float* pixel = rgb + 3 * ((first + k) / samples);
         for (int c = 0; c < 3; ++c) pixel[c] += weight * light[c];
       }
@@ -425,7 +516,7 @@ Preview::Preview(const TriMesh& terrain) : impl_(std::make_unique<Impl>()) {
 
 Preview::~Preview() = default;
 
-Image Preview::render(const TriMesh& mesh, const PreviewOptions& options) const {
+Image Preview::render(const TriMesh& mesh, const PreviewOptions& options, const Air& air) const {
   ZONE("preview");
   require_sane(options);
   const Ground& ground = impl_->ground;
@@ -451,7 +542,7 @@ Image Preview::render(const TriMesh& mesh, const PreviewOptions& options) const 
     return hit.hit.geomID == RTC_INVALID_GEOMETRY_ID ? ground.low : 10 * ground.radius - hit.ray.tfar;
   };
   surroundings.hidden = [&](const Vec3f& from, const Vec3f& to) { return occluded(ground_scene, from, to - from, 0.01f, 0.97f); };
-  const GlowField glow_field = options.glow_light > 0 ? GlowField(lava.positions, lava.triangles, lava.glow, surroundings) : GlowField();
+  const GlowField glow_field = options.glow_light > 0 ? glow_of(lava, air, ground.origin, surroundings) : GlowField();
 
   const Sky sky(options.sun_direction, options.sun, options.sky);
   const Lens lens(options, ground.origin);
@@ -459,11 +550,18 @@ Image Preview::render(const TriMesh& mesh, const PreviewOptions& options) const 
   Image image{options.width, options.height, {}};
   const std::size_t row = std::size_t{3} * static_cast<std::size_t>(options.width);
   image.rgb.assign(row * static_cast<std::size_t>(options.height), 0.0f);
+  std::vector<float> hits;  // of each pixel: sum of distances, and how many there are
+  if (!air.empty()) hits.assign(row / 3 * 2 * static_cast<std::size_t>(options.height), 0.0f);
   {
     ZONE("preview.rays");
     parallel_for(
         static_cast<std::size_t>(options.height),
-        [&](std::size_t y) { picture.render_span(static_cast<int>(y), 0, options.width, image.rgb.data() + y * row); }, 4);
+        [&](std::size_t y) { picture.render_span(static_cast<int>(y), 0, options.width, image.rgb.data() + y * row, hits.empty() ? nullptr : hits.data() + y * row / 3 * 2); }, 4);
+  }
+  if (!air.empty()) {
+    std::vector<float> depth(hits.size() / 2);
+    for (std::size_t i = 0; i < depth.size(); ++i) depth[i] = 2 * hits[2 * i + 1] >= static_cast<float>(options.samples) ? hits[2 * i] / hits[2 * i + 1] : kFar;
+    draw_air(image, depth, lens.view(ground.origin), sky, options, air);
   }
   add_bloom(image, static_cast<float>(options.bloom));
   return image;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "geometry/mesh/tri_mesh.h"
+#include "geometry/mesh/volume.h"
 
 namespace effuse::skin {
 
@@ -44,6 +45,31 @@ struct PreviewOptions {
   std::uint64_t seed = 0;  ///< of the sample positions; the same for all frames, so that still ground does not shimmer
 };
 
+/// Something small that is drawn by itself: a flake, a grain, a spark, a tongue of fire.
+///   streak  how far it flies while the picture is taken [m]
+///   color   linear light that it reflects; glow: that it gives off
+///   soft    it fades from its middle to its rim; else it is a disk
+struct Speck {
+  Vec3 position = Vec3::Zero(), streak = Vec3::Zero();
+  Real radius = 0.01;
+  Vec3 color = Vec3::Zero(), glow = Vec3::Zero();
+  Real opacity = 1;
+  bool soft = false;
+};
+
+/// Density [1/m] and what it is made of.
+struct Cloud {
+  geometry::GridVolume grid;
+  Vec3 color = Vec3::Ones();  ///< linear light that it scatters
+};
+
+/// What hangs or flies in the air of a picture.
+struct Air {
+  std::vector<Speck> specks;
+  std::vector<Cloud> clouds;
+  bool empty() const { return specks.empty() && clouds.empty(); }
+};
+
 /// Ray-traced pictures (Embree): terrain shaded by slope and altitude under sun and sky, lava by its "color" and "glow".
 /// The terrain's tree is built once, the lava's for each frame. Same bits on any number of threads.
 ///
@@ -64,7 +90,7 @@ class Preview {
   Preview& operator=(const Preview&) = delete;
   /// Linear light after exposure and bloom. Throws InputError for lava that is not well formed, or options out of
   /// range: sizes 1..16384, samples 1..1024, gloss 0..1, a field of view within (0, pi), an eye apart from its target.
-  Image render(const geometry::TriMesh& lava, const PreviewOptions& options) const;
+  Image render(const geometry::TriMesh& lava, const PreviewOptions& options, const Air& air = {}) const;
 
  private:
   struct Impl;

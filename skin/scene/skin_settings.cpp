@@ -48,6 +48,7 @@ SkinSettings read_skin_settings(flow::Parameters& root) {
   detail.fold_wavelength = skin.number("fold_wavelength", "", detail.fold_wavelength, {0, 1e6}, "of ropes and folds, in spacings; 0: the kind's own");
   detail.fold_time = skin.number("fold_time", "s", detail.fold_time, Parameters::not_negative(), "in which the surface's strain rate folds it");
   detail.edge = skin.number("edge", "", detail.edge, {0.05, 10}, "length of the mesh's edges, in spacings");
+  detail.oversample = skin.number("oversample", "", detail.oversample, {1, 16}, "edges so many times shorter, with no finer bumps: triangles follow the bumps more closely and change less from frame to frame; 4 for stills and slow shots");
   s.edge_pixels = skin.number("edge_pixels", "", s.edge_pixels, {0, 1000}, "edges as long as this many pixels of the picture's camera, where that is more than edge; 0: edge everywhere");
   s.color.strength = skin.number("glow", "", s.color.strength, {0, 1e6}, "light of lava at 1200 degC, white paper in the sun is 1");
 

@@ -2,6 +2,7 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <cstring>
 #include <vector>
 
 #include "geometry/base/check.h"
@@ -45,22 +46,94 @@ EFFUSE_CLONES void nearest_of(const std::vector<Ball>& balls, Rows& least, Rows&
   }
 }
 
-/// Sum of (1 - |x_i - x_j|^2 / reach^2)^3 over the particles, i among them; or `enough`, once it has come to that.
-float crowd(const ParticleGrid& particles, const Vec3& x, Real reach, float enough) {
-  float sum = 0;
-  const Vec3 margin = Vec3::Constant(reach);
-  particles.runs(x - margin, x + margin, [&](Index from, Index to) {
-    for (Index j = from; j < to && sum < enough; ++j) {
-      const float t = static_cast<float>(1 - (particles.x()[j] - x).squaredNorm() / (reach * reach));
-      if (t > 0) sum += t * t * t;
-    }
-  });
-  return std::min(sum, enough);
+/// Particles round a stretch of a column, coordinates from its corner.
+struct Around {
+  std::vector<float> x, y, z;
+};
+
+/// Sums of max(0, 1 - |p - x|^2 / reach^2)^3 over x, at eight points.
+EFFUSE_CLONES void crowds(const Around& around, const float* at_x, const float* at_y, const float* at_z, float reach, float* out) {
+  const Row zero{};
+  Row px, py, pz;
+  std::memcpy(&px, at_x, sizeof px);
+  std::memcpy(&py, at_y, sizeof py);
+  std::memcpy(&pz, at_z, sizeof pz);
+  const float inverse = 1 / (reach * reach);
+  Row sum = zero;
+  for (std::size_t j = 0; j < around.x.size(); ++j) {
+    const Row dx = px - around.x[j], dy = py - around.y[j], dz = pz - around.z[j];
+    Row t = 1 - (dx * dx + dy * dy + dz * dz) * inverse;
+    t = t > zero ? t : zero;
+    sum += t * t * t;
+  }
+  std::memcpy(out, &sum, sizeof sum);
 }
 
 }  // namespace
 
-void cover_particles(const ParticleGrid& particles, const Blocks& blocks, float outside, const Cover& cover, Field& phi) {
+std::vector<float> ball_radii(const ParticleGrid& particles, const Cover& cover, std::span<const std::uint8_t> wanted) {
+  CHECK(wanted.empty() || wanted.size() == particles.size());
+  std::vector<float> radius(particles.size(), 0);
+  if (!(cover.factor > 0)) return radius;
+  // Upright stretches of columns: so high that about eight particles lie in one, wherever others are wanted or not.
+  const float reach = cover.reach;
+  const Real stretch = 4 * static_cast<Real>(reach);
+  parallel_ranges(particles.columns().size(), 8, [&](std::size_t begin, std::size_t end) {
+    Around around;
+    std::array<Index, kSide> group;
+    for (std::size_t c = begin; c < end; ++c) {
+      const ParticleGrid::Column& column = particles.columns()[c];
+      Index i = column.begin;
+      while (i < column.end) {
+        const Vec3& first = particles.x()[i];
+        const Real bottom = stretch * std::floor(first.z() / stretch);
+        // The columns' own corner: the same for all of it, whichever is asked for.
+        const Vec3 corner(std::floor(first.x() / particles.side()) * particles.side(), std::floor(first.y() / particles.side()) * particles.side(), bottom);
+        Index last = i;
+        bool any = false;
+        while (last < column.end && particles.x()[last].z() < bottom + stretch) {
+          any = any || wanted.empty() || wanted[last];
+          ++last;
+        }
+        if (any) {
+          for (auto* v : {&around.x, &around.y, &around.z}) v->clear();
+          const Vec3 margin = Vec3::Constant(static_cast<Real>(reach));
+          particles.runs(corner - margin, corner + Vec3(particles.side(), particles.side(), stretch) + margin, [&](Index from, Index to) {
+            for (Index j = from; j < to; ++j) {
+              const Eigen::Vector3f p = (particles.x()[j] - corner).cast<float>();
+              around.x.push_back(p.x());
+              around.y.push_back(p.y());
+              around.z.push_back(p.z());
+            }
+          });
+          for (Index next = i; next < last;) {
+            float x[kSide] = {}, y[kSide] = {}, z[kSide] = {}, W[kSide];
+            int n = 0;
+            for (; next < last && n < kSide; ++next) {
+              if (!wanted.empty() && !wanted[next]) continue;
+              const Eigen::Vector3f p = (particles.x()[next] - corner).cast<float>();
+              x[n] = p.x();
+              y[n] = p.y();
+              z[n] = p.z();
+              group[static_cast<std::size_t>(n++)] = next;
+            }
+            if (n == 0) break;
+            crowds(around, x, y, z, reach, W);
+            for (int k = 0; k < n; ++k) {
+              const float t = std::clamp((cover.none - W[k]) / (cover.none - cover.all), 0.0f, 1.0f);
+              const Index of = group[static_cast<std::size_t>(k)];
+              radius[of] = cover.factor * particles.radius()[of] * t * t * (3 - 2 * t);
+            }
+          }
+        }
+        i = last;
+      }
+    }
+  });
+  return radius;
+}
+
+void cover_particles(const ParticleGrid& particles, const Blocks& blocks, const Cover& cover, const Field& weight, Field& phi) {
   ZONE("skin.cover");
   const float factor = cover.factor, blend = cover.blend;
   if (factor <= 0) return;
@@ -78,10 +151,10 @@ void cover_particles(const ParticleGrid& particles, const Blocks& blocks, float 
     });
   };
 
-  // Particles near a block's shallow voxels that are shallow themselves: others' balls ask for nothing. The field's slope is about one, two at
-  // most between the particle and its nearest voxel.
-  std::vector<std::uint8_t> shallow(blocks.size(), 0);
-  std::vector<float> radius(particles.size(), -1);  // of the balls; -1: not wanted, 1: wanted
+  // Particles near a block's shallow voxels that may be shallow themselves: others' balls ask for nothing. W at a particle is what the voxels
+  // round it say but for its curvature, of some W / reach^2.
+  const float surely = cover.none * (1 + 1.6f / (cover.reach * cover.reach));
+  std::vector<std::uint8_t> shallow(blocks.size(), 0), wanted(particles.size(), 0);
   parallel_for(
       blocks.size(),
       [&](std::size_t b) {
@@ -89,19 +162,14 @@ void cover_particles(const ParticleGrid& particles, const Blocks& blocks, float 
         // A ball asks for no less than -radius.
         shallow[b] = *std::max_element(value, value + kVoxels) > -largest - blend;
         if (!shallow[b]) return;
-        const BlockCoord& c = blocks.coords()[b];
-        each_near(b, [&](Index i, const Eigen::Vector3f& p) {
-          const auto at = [&](int axis) { return kSide * c[static_cast<std::size_t>(axis)] + static_cast<int>(std::lround(p[axis])); };
-          if (blocks.at(phi, outside, static_cast<Index>(b), at(0), at(1), at(2)) > -2 * largest - blend - 2) std::atomic_ref<float>(radius[i]).store(1, std::memory_order_relaxed);
+        each_near(b, [&](Index i, const Eigen::Vector3f&) {
+          std::atomic_ref<std::uint8_t> want(wanted[i]);
+          if (want.load(std::memory_order_relaxed) == 0 && blocks.sample(weight, 0, static_cast<Index>(b), particles.x()[i]) < surely)
+            want.store(1, std::memory_order_relaxed);
         });
       },
       8);
-  parallel_for(radius.size(), [&](std::size_t i) {
-    if (radius[i] < 0) return;
-    const float W = crowd(particles, particles.x()[i], static_cast<Real>(cover.reach), cover.none);
-    const float t = std::clamp((cover.none - W) / (cover.none - cover.all), 0.0f, 1.0f);
-    radius[i] = factor * particles.radius()[i] * t * t * (3 - 2 * t);
-  });
+  const std::vector<float> radius = ball_radii(particles, cover, wanted);
   parallel_ranges(blocks.size(), 8, [&](std::size_t begin, std::size_t end) {
     std::vector<Ball> near;
     Rows least, nearest;

@@ -41,13 +41,8 @@ constexpr float kCoverBlend = 0.3f;  // [spacings]: round enough for fans and re
 // W at a particle over that of a full neighbourhood: in a box's corners 0.5 to 0.62, on its edges 0.55 to 0.7, on faces 0.74 and more.
 constexpr float kStandsOut = 0.62f, kLiesFlat = 0.72f;
 
-/// What the field is made with; lengths in voxels.
+/// What becomes of the field; lengths in voxels.
 struct Making {
-  SurfaceKernel kernel = SurfaceKernel::kRound;
-  RasterOptions raster;
-  float smoothing = 0;       // time of the flow
-  float lone = 0, sheet = 0;  // W at the surface of a lone particle, of a plane sheet
-  Cover cover;
   float sink = 0;
   const geometry::Terrain* terrain = nullptr;
   Real volume = 0;      // to be enclosed; 0: as it comes
@@ -59,12 +54,12 @@ struct Making {
 /// The field before its shift, on some of the blocks; ground: out.
 Field make_field(const LevelSet::Impl& s, const Blocks& blocks, const Making& making, GroundField& ground) {
   Field phi, weight;
-  if (making.kernel == SurfaceKernel::kAnisotropic)
-    rasterize_anisotropic(s.particles, anisotropic_kernels(s.particles, making.raster.spacing, making.raster.reach, &blocks), blocks, making.raster, phi, weight);
+  if (s.rule.kernel == SurfaceKernel::kAnisotropic)
+    rasterize_anisotropic(s.particles, anisotropic_kernels(s.particles, s.rule.raster.spacing, s.rule.raster.reach, &blocks), blocks, s.rule.raster, phi, weight);
   else
-    rasterize(s.particles, blocks, making.raster, phi, weight);
-  smooth(blocks, s.outside, making.smoothing, weight, making.lone, making.sheet, phi);
-  cover_particles(s.particles, blocks, s.outside, making.cover, phi);
+    rasterize(s.particles, blocks, s.rule.raster, phi, weight);
+  smooth(blocks, s.outside, s.rule, weight, phi);
+  cover_particles(s.particles, blocks, s.rule.cover, weight, phi);
   if (!making.terrain) return phi;
   ground = sample_ground(blocks, s.particles.origin(), s.voxel, *making.terrain, std::max(2 * s.lift, making.depth()) + 1);
   Field lifted;
@@ -84,14 +79,14 @@ void fill_all(const LevelSet::Impl& s, const Making& making, SurfaceCache::Impl&
 Renewal renew_field(const LevelSet::Impl& s, const Making& making, SurfaceCache::Impl& last, const std::vector<std::uint64_t>& hash, const HashSet& hashes) {
   // How far a value feels a particle, what it needs of the values around it (a voxel a step, the lift), and whether it depends on
   // what the blocks beside its own hold (sums at nodes; being deep inside).
-  const int steps = smoothing_steps(making.smoothing);
+  const int steps = smoothing_steps(s.rule.smoothing);
   const float lift = making.terrain ? 2 * s.lift + 2 : 0, beyond = static_cast<float>(steps) + lift;
-  const bool round = making.kernel == SurfaceKernel::kRound, blocks_beside = !round || making.raster.reach >= kFineReach;
+  const bool round = s.rule.kernel == SurfaceKernel::kRound, blocks_beside = !round || s.rule.raster.reach >= kFineReach;
   const Real felt = round ? static_cast<Real>(s.reach) + (blocks_beside ? 4 : 0)
-                          : std::max<Real>(kernel_influence(making.raster.spacing, s.reach), kSide + static_cast<Real>(making.raster.spacing));
+                          : std::max<Real>(kernel_influence(s.rule.raster.spacing, s.reach), kSide + static_cast<Real>(s.rule.raster.spacing));
   const Real largest = parallel_max(s.particles.size(), 0, [&](std::size_t i) { return static_cast<Real>(s.particles.radius()[i]); });
-  const Real covered = static_cast<Real>(making.cover.factor) * largest + static_cast<Real>(kCoverBand + lift + s.reach);
-  Renewal renewal = find_stale(last, s.particles, hash, hashes, s.blocks, std::max(felt + static_cast<Real>(beyond), making.cover.factor > 0 ? covered : 0));
+  const Real covered = static_cast<Real>(s.rule.cover.factor) * largest + static_cast<Real>(kCoverBand + lift + s.reach);
+  Renewal renewal = find_stale(last, s.particles, hash, hashes, s.blocks, std::max(felt + static_cast<Real>(beyond), s.rule.cover.factor > 0 ? covered : 0));
   const std::vector<std::uint8_t> needed = widened(s.blocks, renewal.stale, static_cast<int>(std::ceil(beyond / kSide)) + (blocks_beside ? 1 : 0));
   std::vector<BlockCoord> coords;
   for (std::size_t b = 0; b < s.blocks.size(); ++b)
@@ -134,6 +129,7 @@ Shift match(LevelSet::Impl& s, const Making& making, const Field& phi, const Fie
   if (!(making.volume > 0)) return shift;
   shift = matching_shift(s.blocks, s.outside, phi, above, making.volume, making.most_shift, known);
   s.report.shift = static_cast<Real>(shift.voxels()) * s.voxel;
+  s.level = shift.exact / kShiftSteps;
   s.outside -= shift.voxels();
   return shift;
 }
@@ -288,14 +284,15 @@ LevelSet build_level_set(const geometry::Points& points, Real volume, const geom
   if (terrain) s.terrain = *terrain;
   const float full = static_cast<float>(64 * kPi / 315) * std::pow(s.reach / d, 3.0f);  // W where particles are all round
   const float near_surface = 1 - (radius / s.reach) * (radius / s.reach);
-  Making making{.kernel = options.kernel,
-                .raster = {.reach = s.reach, .spacing = d, .radius_factor = 2 * static_cast<float>(options.radius), .outside = s.outside},
-                .smoothing = static_cast<float>(options.smoothing) * d * d / 24,
-                .lone = near_surface * near_surface * near_surface,
-                .cover = {.factor = options.kernel == SurfaceKernel::kRound ? 2 * static_cast<float>(options.cover) : 0, .blend = kCoverBlend * d, .reach = s.reach, .all = kStandsOut * full, .none = kLiesFlat * full},
-                .sink = sink,
-                .terrain = terrain};
-  making.sheet = static_cast<float>(kPi) / 4 * (s.reach / d) * (s.reach / d) * making.lone * near_surface;
+  s.rule = {.kernel = options.kernel,
+            .raster = {.reach = s.reach, .spacing = d, .radius_factor = 2 * static_cast<float>(options.radius), .outside = s.outside},
+            .smoothing = static_cast<float>(options.smoothing) * d * d / 24,
+            .lone = near_surface * near_surface * near_surface,
+            .cover = {.factor = 2 * static_cast<float>(options.cover), .blend = kCoverBlend * d, .reach = s.reach, .all = kStandsOut * full, .none = kLiesFlat * full}};
+  s.rule.sheet = static_cast<float>(kPi) / 4 * (s.reach / d) * (s.reach / d) * s.rule.lone * near_surface;
+  Making making;
+  making.sink = sink;
+  making.terrain = terrain;
 
   const Real voxels = std::pow(s.voxel, -3);
   if (options.match_volume && volume > 0) {

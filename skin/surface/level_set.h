@@ -25,14 +25,14 @@ struct LevelSetOptions {
   Real influence = 2;        ///< a particle is felt within influence * spacing
   SurfaceKernel kernel = SurfaceKernel::kRound;  ///< kAnisotropic: with smoothing 0, or edges are lost again
   Real radius = 0.6;         ///< of the sphere round a lone particle, in spacings (about (3/4pi)^(1/3) = 0.62 for equal volume)
-  Real cover = 0.44;         ///< kRound: of the ball round a particle that stands out, in units of twice its radius; 0: none. At most `radius`
+  Real cover = 0.44;         ///< of the ball round a particle that stands out, in units of twice its radius; 0: none. At most `radius`
   int smoothing = 2;         ///< passes of mean-curvature flow, each as far as one at voxel = spacing / 2 whatever the voxel
   Real sink = 0;             ///< [m] how far under the ground the surface ends; 0: one and a half voxels
   Real drop_volume = 0;      ///< closed pieces and closed bubbles smaller than this many particles' volume are dropped, filled
   bool match_volume = true;  ///< shift the surface so that it encloses the particles' volume above ground
 };
 
-/// What building a level set did. The volume is matched in steps of 1/128 voxel of shift.
+/// What building a level set did. The volume is matched in steps of 1/64 voxel of shift.
 struct LevelSetReport {
   std::size_t particles = 0;
   Real volume = 0;               ///< [m^3] enclosed, above ground

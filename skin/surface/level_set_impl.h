@@ -11,11 +11,30 @@
 #include "skin/surface/blocks.h"
 #include "skin/surface/level_set.h"
 #include "skin/surface/particle_grid.h"
+#include "skin/surface/rasterize.h"
 
 /// For the .cpp files of this folder: what a level set holds, and the steps of its making. Lengths in voxels unless [m].
 namespace effuse::skin {
 
 class ReturnedField;
+
+/// A ball round each particle that stands out, joined to the field.
+struct Cover {
+  float factor = 0;         ///< of a ball, in its particle's radii; 0: none
+  float blend = 1;          ///< [voxels], > 0
+  float reach = 4;          ///< R of rasterize.h
+  float all = 0, none = 1;  ///< particles where W is up to `all` have a whole ball, from `none` on they have none; all < none
+};
+/// What the field is made with before the ground cuts it, lengths in voxels.
+struct FieldRule {
+  SurfaceKernel kernel = SurfaceKernel::kRound;
+  RasterOptions raster;
+  float smoothing = 0;        // time of the flow
+  float lone = 0, sheet = 0;  // W at the surface of a lone particle, of a plane sheet
+  Cover cover;
+};
+/// How much of the flow acts where the field's weight is W: none on lone particles.
+float smoothing_share(const FieldRule& rule, float W);
 
 struct LevelSet::Impl {
   Impl() = default;
@@ -28,10 +47,12 @@ struct LevelSet::Impl {
   float outside = 2.8f;  ///< value where there are no blocks; nothing is larger
   float lift = 1;        ///< height of the lowest particles over the ground: what is under it is filled
   ParticleGrid particles;
+  FieldRule rule;
   Blocks blocks;
   Field phi;  ///< the surface is its zero level; about a distance near it
   std::optional<geometry::Terrain> terrain;
   LevelSetReport report;
+  Real level = 0;        ///< the shift [voxels], finer than the field's was: where the particles' own surface lies
   std::uint64_t frame = 0;       ///< of its SurfaceCache; 0: made without one
   std::shared_ptr<ReturnedField> home;  ///< of that cache
   std::vector<Index> unchanged;  ///< of each block with the values of one of the frame before: which; kNone. Empty: none has
@@ -55,26 +76,22 @@ GroundField sample_ground(const Blocks& blocks, const Vec3& origin, Real voxel, 
 /// max(g, 1.5 lift), max(g, 2 lift); continuous. Voxels deeper than `depth` are left as they are.
 void lift_to_ground(const Blocks& blocks, float outside, float lift, const GroundField& ground, float depth, const Field& old, Field& phi);
 
-/// Mean-curvature flow phi_t = kappa |grad phi| for a time [voxels^2], in explicit steps; where W (rasterize.h) is like a
-/// lone particle's nothing moves. lone, sheet: W at the surface of a lone particle and of a plane sheet.
-/// A voxel feels what lies within so many voxels as there are steps.
+/// Mean-curvature flow phi_t = kappa |grad phi| for rule.smoothing [voxels^2], in explicit steps; where W (rasterize.h) is like a
+/// lone particle's nothing moves. A voxel feels what lies within so many voxels as there are steps.
 int smoothing_steps(float time);
-void smooth(const Blocks& blocks, float outside, float time, const Field& weight, float lone, float sheet, Field& phi);
+void smooth(const Blocks& blocks, float outside, const FieldRule& rule, const Field& weight, Field& phi);
 
-/// A ball round each particle that stands out, joined to the field.
-struct Cover {
-  float factor = 0;         ///< of a ball, in its particle's radii; 0: none
-  float blend = 1;          ///< [voxels], > 0
-  float reach = 4;          ///< R of rasterize.h
-  float all = 0, none = 1;  ///< particles where W is up to `all` have a whole ball, from `none` on they have none; all < none
-};
+/// Radii of the balls round the sorted particles, rho_i below.
+///   wanted  which are to be found, the others are 0; empty: all
+std::vector<float> ball_radii(const ParticleGrid& particles, const Cover& cover, std::span<const std::uint8_t> wanted = {});
 /// With rho_i = s factor r_i, s falling from 1 to 0 as W at the particle goes from `all` to `none`, and b = min |x - x_i| - rho_i,
 ///
 ///   phi = min(phi, b) - max(0, blend - |phi - b|)^2 / (4 blend)
 ///
 /// within kCoverBand of a ball; the square rounds the edge between ball and field. Where balls of different sizes meet b is that of the least
 /// |x - x_i|^2 - rho_i^2. A voxel feels particles within factor r_i + kCoverBand + R.
-void cover_particles(const ParticleGrid& particles, const Blocks& blocks, float outside, const Cover& cover, Field& phi);
+///   weight  W at the voxels
+void cover_particles(const ParticleGrid& particles, const Blocks& blocks, const Cover& cover, const Field& weight, Field& phi);
 inline constexpr float kCoverBand = 2;
 
 /// Volumes of blocks that the last frame knows, by shift in steps: out, those of this frame.
@@ -91,9 +108,10 @@ struct KnownVolumes {
 Real enclosed(const Blocks& blocks, float outside, const Field& phi, const Field& above, float shift);
 /// At shift 0, blocks that are known taken from there.
 Real enclosed(const Blocks& blocks, float outside, const Field& phi, const Field& above, KnownVolumes& known);
-inline constexpr int kShiftSteps = 128;
+inline constexpr int kShiftSteps = 64;
 struct Shift {
   int steps = 0;     ///< of 1 / kShiftSteps voxels
+  Real exact = 0;    ///< the same, between two steps where the target is
   Real volume = -1;  ///< [voxels] enclosed by then
   float voxels() const { return static_cast<float>(steps) / kShiftSteps; }
 };

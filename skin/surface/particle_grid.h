@@ -29,6 +29,7 @@ class ParticleGrid {
     Index begin, end;  // its particles, by rising z
   };
   const std::vector<Column>& columns() const { return columns_; }
+  Real side() const { return side_; }  ///< of a column [voxels]
 
   /// f(begin, end) for runs that together hold every particle in the box (and others of the same columns), west to east,
   /// south to north: an order that does not depend on the points' own.

@@ -146,8 +146,15 @@ std::vector<std::uint8_t> drop_pieces(const Blocks& blocks, const ParticleGrid& 
     Real volume = 0;       // [voxels], with a soft edge, the field's slope taken as one
   };
   std::vector<Piece> pieces(first[n]);
+  std::size_t unsettled = 0;  // pieces of lava without a particle so far
+  for (std::size_t b = 0; b < n; ++b)
+    for (std::size_t k = 0; k < in[b].inside.size(); ++k) {
+      const Index name = first[b] + static_cast<Index>(k);
+      unsettled += in[b].inside[k] && sets.root(name) == name;
+    }
   Index home = kNone;  // of the particle before: the next one is often in the same block
   for (const Vec3& x : particles.x()) {
+    if (unsettled == 0) break;
     const int i = static_cast<int>(std::floor(x.x())), j = static_cast<int>(std::floor(x.y())), k = static_cast<int>(std::floor(x.z()));
     const auto is_at = [&](Index b) { return blocks.coords()[b][0] == i >> 3 && blocks.coords()[b][1] == j >> 3 && blocks.coords()[b][2] == k >> 3; };
     if (home == kNone || !is_at(home)) home = blocks.block_at(Vec3(i, j, k));
@@ -160,7 +167,10 @@ std::vector<std::uint8_t> drop_pieces(const Blocks& blocks, const ParticleGrid& 
       const Index set = in[b].at(voxel_index(a & 7, c & 7, e & 7));
       if (b == last_block && set == last_set) continue;
       last_block = b, last_set = set;
-      pieces[sets.root(first[b] + set)].settled = true;
+      Piece& piece = pieces[sets.root(first[b] + set)];
+      if (piece.settled) continue;
+      piece.settled = true;
+      unsettled -= in[b].inside[set];
     }
   }
   if (least > 0)

@@ -59,11 +59,16 @@ int smoothing_steps(float time) {
   return static_cast<int>(std::ceil(time / kLongestStep - 1e-4f));
 }
 
-void smooth(const Blocks& blocks, float outside, float time, const Field& weight, float lone, float sheet, Field& phi) {
+float smoothing_share(const FieldRule& rule, float W) {
+  const float from = 1.2f * rule.lone, to = std::max(1.5f * rule.lone, 0.75f * rule.sheet);
+  const float ramp = std::clamp((W - from) / (to - from), 0.0f, 1.0f);
+  return ramp * ramp * (3 - 2 * ramp);
+}
+
+void smooth(const Blocks& blocks, float outside, const FieldRule& rule, const Field& weight, Field& phi) {
   ZONE("skin.smooth");
-  const int steps = smoothing_steps(time);
-  const float dt = steps > 0 ? time / static_cast<float>(steps) : 0;
-  const float from = 1.2f * lone, to = std::max(1.5f * lone, 0.75f * sheet);
+  const int steps = smoothing_steps(rule.smoothing);
+  const float dt = steps > 0 ? rule.smoothing / static_cast<float>(steps) : 0;
 
   Field rate(steps > 0 ? phi.size() : 0), next = steps > 0 ? phi : Field{};
   for (int step = 0; step < steps; ++step) {
@@ -72,10 +77,7 @@ void smooth(const Blocks& blocks, float outside, float time, const Field& weight
         [&](std::size_t b) {
           const float* old = &phi[b * kVoxels];
           if (step == 0)
-            for (std::size_t v = 0; v < kVoxels; ++v) {
-              const float ramp = std::clamp((weight[b * kVoxels + v] - from) / (to - from), 0.0f, 1.0f);
-              rate[b * kVoxels + v] = ramp * ramp * (3 - 2 * ramp) * dt;
-            }
+            for (std::size_t v = 0; v < kVoxels; ++v) rate[b * kVoxels + v] = smoothing_share(rule, weight[b * kVoxels + v]) * dt;
           // A block without the band is the same in both fields.
           if (std::none_of(old, old + kVoxels, [](float v) { return std::abs(v) < kBand; })) return;
           float p[1000];

@@ -4,14 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 
 #include "geometry/base/error.h"
-#include "geometry/base/files.h"
-#include "geometry/base/hash.h"
 #include "geometry/base/parallel.h"
 #include "geometry/base/zones.h"
 #include "skin/surface/level_set_impl.h"
+#include "skin/surface/vdb_file.h"
 #include "skin/surface/vdb_layout.h"
 
 namespace effuse::skin {
@@ -22,13 +20,6 @@ namespace {
 
 constexpr float kBand = 3;  // [voxels] half width of the level set
 constexpr int kNodes = 5;   // of a block at every second voxel: 0, 2, 4, 6, 8
-
-/// What a package said, fit for a line: OpenVDB's words on a broken file can be hundreds of megabytes of its bytes.
-std::string brief(const char* words) {
-  std::string text;
-  for (const char* c = words; *c != 0 && text.size() < 200; ++c) text += *c >= ' ' && *c <= '~' ? *c : '?';
-  return text;
-}
 
 /// Blocks as a grid of OpenVDB in the world. value(block, voxel) and on(block, voxel); blocks of nothing on are left out,
 /// or a tile `deep` if every value is that.
@@ -122,27 +113,6 @@ openvdb::GridPtrVec grids_of(const LevelSet::Impl& s) {
   return grids;
 }
 
-/// OpenVDB gives every file a random name of its own (a UUID). Ours is the hash of what the file holds, so that the same
-/// frame is the same bytes. It stands after the magic number, the version of the format, two of the library and a flag.
-void name_by_content(const fs::path& file) {
-  constexpr std::streamoff kAt = 8 + 3 * 4 + 1;
-  constexpr std::size_t kLength = 36;
-  std::string bytes = read_file(file);
-  // A layout we do not know: better a random name than a damaged file.
-  if (bytes.size() < kAt + kLength || bytes[kAt + 8] != '-' || bytes[kAt + 13] != '-' || bytes[kAt + 18] != '-' || bytes[kAt + 23] != '-')
-    return;
-  bytes.replace(kAt, kLength, kLength, '0');
-  StateHash first, second;
-  first.add(std::string_view(bytes));
-  second.add(first.value());
-  const std::string hex = first.hex() + second.hex();
-  const std::string uuid =
-      fmt::format("{}-{}-4{}-8{}-{}", hex.substr(0, 8), hex.substr(8, 4), hex.substr(12, 3), hex.substr(15, 3), hex.substr(18, 12));
-  std::fstream out(file, std::ios::in | std::ios::out | std::ios::binary);
-  out.seekp(kAt);
-  out.write(uuid.data(), kLength);
-}
-
 }  // namespace
 
 void write_vdb(const fs::path& file, const LevelSet& surface, const std::vector<std::pair<std::string, std::string>>& metadata) {
@@ -152,32 +122,9 @@ void write_vdb(const fs::path& file, const LevelSet& surface, const std::vector<
   try {
     grids = grids_of(surface.impl());
   } catch (const openvdb::ArithmeticError& e) {
-    throw InputError(Place{file.string()}, fmt::format("voxels of {:.3g} cannot be written as OpenVDB ({}): positions and radii in a smaller unit would do", surface.voxel(), brief(e.what())));
+    throw InputError(Place{file.string()}, fmt::format("voxels of {:.3g} cannot be written as OpenVDB ({}): positions and radii in a smaller unit would do", surface.voxel(), brief_words(e.what())));
   }
-  openvdb::MetaMap meta;
-  for (const auto& [key, value] : metadata) meta.insertMeta(key, openvdb::StringMetadata(value));
-
-  AtomicFile out(file);
-  try {
-    openvdb::io::File vdb(out.temporary().string());
-    vdb.setCompression(openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK);
-    vdb.write(grids, meta);
-    vdb.close();
-  } catch (const std::exception& e) {
-    throw std::runtime_error(fmt::format("{}: cannot write: {}", file.string(), brief(e.what())));
-  }
-
-  // OpenVDB does not look whether its bytes arrived. After the first that did not its stream is closed to all others, the
-  // table of contents included, so that a file with a sound table is whole.
-  std::vector<std::string> names;
-  try {
-    names = check_vdb_layout(out.temporary());
-  } catch (const InputError&) {
-  }
-  if (names.size() != grids.size())
-    throw ResourceError(fmt::format("{}: what was written does not read back: is the disk full?", file.string()));
-  name_by_content(out.temporary());
-  out.commit();
+  write_vdb_file(file, grids, metadata);
 }
 
 std::vector<std::string> describe_vdb(const fs::path& file) {
@@ -190,8 +137,8 @@ std::vector<std::string> describe_vdb(const fs::path& file) {
     // Headers only: what the writer noted of its grids, not the voxels themselves.
     const openvdb::GridPtrVecPtr grids = in.readAllGridMetadata();
     for (const openvdb::GridBase::Ptr& grid : *grids) {
-      std::string line = fmt::format("{}: {}, {}, voxel {:.6g} m", brief(grid->getName().c_str()),
-                                     openvdb::GridBase::gridClassToMenuName(grid->getGridClass()), brief(grid->valueType().c_str()),
+      std::string line = fmt::format("{}: {}, {}, voxel {:.6g} m", brief_words(grid->getName().c_str()),
+                                     openvdb::GridBase::gridClassToMenuName(grid->getGridClass()), brief_words(grid->valueType().c_str()),
                                      grid->voxelSize().x());
       if (const auto count = grid->getMetadata<openvdb::Int64Metadata>(openvdb::GridBase::META_FILE_VOXEL_COUNT))
         line += fmt::format(", {} active voxels", count->value());
@@ -206,7 +153,7 @@ std::vector<std::string> describe_vdb(const fs::path& file) {
       lines.push_back(std::move(line));
     }
   } catch (const std::exception& e) {
-    throw InputError(Place{file.string()}, fmt::format("damaged OpenVDB file: {}", brief(e.what())));
+    throw InputError(Place{file.string()}, fmt::format("damaged OpenVDB file: {}", brief_words(e.what())));
   }
   return lines;
 }

@@ -195,7 +195,8 @@ Shift matching_shift(const Blocks& blocks, float outside, const Field& phi, cons
   if (known.last)
     for (const auto& [k, of_blocks] : *known.last)
       if (k >= low - 1 && k <= high + 1 && !known.now.contains(k)) volume(k, known);
-  return {lower ? low : high, ((lower ? at_low : at_high) + 1) * target};
+  const Real exact = high > low && at_low < 0 && at_high >= 0 ? low - at_low / (at_high - at_low) * (high - low) : lower ? low : high;
+  return {lower ? low : high, exact, ((lower ? at_low : at_high) + 1) * target};
 }
 
 Real volume_above_ground(const LevelSet& surface, const geometry::Terrain* terrain) {

@@ -9,6 +9,7 @@
 #include "geometry/base/check.h"
 #include "geometry/base/zones.h"
 #include "skin/tessellate/coarsen.h"
+#include "skin/surface/particle_surface.h"
 #include "skin/tessellate/refine_on.h"
 
 namespace effuse::skin {
@@ -93,6 +94,7 @@ Skin make_skin(const geometry::Points& points, Real volume, const geometry::Terr
   CHECK(!voronoi || options.coarsen == 0);
   std::optional<DisplaceOptions> detail = options.detail;
   if (detail) detail->spacing = spacing;
+  const bool displaced = detail && detail->amplitude > 0;
 
   Skin skin;
   skin.surface = build_level_set(points, volume, terrain, options.level_set, last);
@@ -103,7 +105,10 @@ Skin make_skin(const geometry::Points& points, Real volume, const geometry::Terr
   if (voronoi) {
     const TriMesh surface = mesh_level_set(skin.surface, last);
     Tessellation tessellation = tessellate_voronoi(surface, regions, points);
-    if (detail) refined = refine_on(tessellation, surface, fineness(*detail));
+    if (detail) {
+      refined = refine_on(tessellation, surface, fineness(*detail));
+      if (displaced) ParticleSurface(skin.surface).project(tessellation.mesh);
+    }
     lift_facets(tessellation.mesh);
     skin.report.voronoi = tessellation.report;
     skin.regions = labels_of(tessellation);
@@ -112,6 +117,7 @@ Skin make_skin(const geometry::Points& points, Real volume, const geometry::Terr
     skin.mesh = tessellate_level_set(skin.surface, last);
     if (detail) refined = refine_for(skin.mesh, *detail);
     skin.regions = label_vertices(skin.mesh, regions, points);
+    if (displaced) ParticleSurface(skin.surface).project(skin.mesh);
   }
   const std::vector<Vec3> ways = ways_out(skin.mesh);
   if (detail) skin.report.displace = displace_only(skin.mesh, points, terrain, *detail);

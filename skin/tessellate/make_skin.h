@@ -64,6 +64,9 @@ geometry::TriMesh tessellate_level_set(const LevelSet& surface, SurfaceCache* la
 /// surface's normals by one distance (keep_volume), a quarter of a spacing at most. Not where a volume is a quarter and more off: then it is
 /// not the mesh's doing (a roof over the lava, particles that overlap).
 ///
+/// Displaced skins (an amplitude above 0) are displaced from the surface of the particles themselves (ParticleSurface), not of the level set's voxels, so that they go with
+/// the lava wherever it is on the lattice.
+///
 /// The surface particles are those that are nearest to a vertex of the smooth surface: kLevelSet of the mesh refined, kVoronoi of the level
 /// set's own mesh. Each has one region, nobody else has any. kLevelSet: vertices know theirs, also after displacement (a
 /// region is where the smooth surface is nearest to its particle) and coarsening (which leaves every region a vertex). kVoronoi: triangles

@@ -7,6 +7,7 @@
 #include "geometry/base/hash.h"
 #include "geometry/base/parallel.h"
 #include "geometry/base/random.h"
+#include "geometry/query/near_triangles.h"
 #include "geometry/terrain/terrain.h"
 #include "geometry/terrain/triangulate.h"
 #include "tests/geometry/terrain/fields.h"
@@ -29,12 +30,15 @@ std::vector<Vec3> points_over(const HeightField& field, Real layer, std::size_t 
   return points;
 }
 
-void run(benchmark::State& state, const Terrain& terrain, Real layer, Real reach, std::size_t n) {
+void run(benchmark::State& state, const Terrain& terrain, Real layer, Real reach, std::size_t n, bool one_by_one = false) {
   const ThreadLimit one(1);
   const std::vector<Vec3> points = points_over(fields::maunga_whau(), layer, n);
   std::vector<Contact> contacts(n);
   for (auto _ : state) {
-    terrain.contacts(points, reach, contacts);
+    if (one_by_one)
+      for (std::size_t k = 0; k < n; ++k) contacts[k] = terrain.contact(points[k], reach);
+    else
+      terrain.contacts(points, reach, contacts);
     benchmark::ClobberMemory();
   }
   StateHash hash;
@@ -56,10 +60,27 @@ void height_field_contacts(benchmark::State& state) {
 }
 BENCHMARK(height_field_contacts)->Args({1, 100})->Args({3, 100})->Args({10, 100})->Args({3, 25})->Args({3, 1000000})->Unit(benchmark::kMillisecond);
 
+/// By the mesh's cache, which many points make, and by its tree, point by point. The hash is the same: so are the contacts.
 void mesh_contacts(benchmark::State& state) {
-  run(state, Terrain::from_mesh(fields::maunga_whau().mesh()), static_cast<Real>(state.range(0)), static_cast<Real>(state.range(1)) / 100, 10000);
+  run(state, Terrain::from_mesh(fields::maunga_whau().mesh()), static_cast<Real>(state.range(0)), static_cast<Real>(state.range(1)) / 100, 100000);
 }
-BENCHMARK(mesh_contacts)->Args({3, 100})->Args({3, 1000000})->Unit(benchmark::kMillisecond);
+BENCHMARK(mesh_contacts)->Args({1, 100})->Args({3, 100})->Args({10, 100})->Args({3, 1000000})->Unit(benchmark::kMillisecond);
+
+void mesh_contacts_by_tree(benchmark::State& state) {
+  run(state, Terrain::from_mesh(fields::maunga_whau().mesh()), static_cast<Real>(state.range(0)), static_cast<Real>(state.range(1)) / 100, 100000, true);
+}
+BENCHMARK(mesh_contacts_by_tree)->Args({1, 100})->Args({3, 100})->Args({10, 100})->Unit(benchmark::kMillisecond);
+
+/// Making the cache, for a reach in centimetres; the label says its size.
+void mesh_cache(benchmark::State& state) {
+  const ThreadLimit one(1);
+  const TriMesh mesh = fields::maunga_whau().mesh();
+  std::size_t bytes = 0;
+  for (auto _ : state) bytes = NearTriangles::build(mesh.positions, mesh.triangles, static_cast<Real>(state.range(0)) / 100)->bytes();
+  state.SetLabel(std::to_string(bytes / mesh.triangles.size()) + " bytes a triangle");
+  state.SetItemsProcessed(static_cast<std::int64_t>(state.iterations() * mesh.triangles.size()));
+}
+BENCHMARK(mesh_cache)->Arg(25)->Arg(100)->Arg(400)->Unit(benchmark::kMillisecond);
 
 /// Greedy insertion on a million posts of hills of many sizes, to an error in centimetres. The label: triangles, the error
 /// measured, and a hash of the mesh.

@@ -44,6 +44,20 @@ TEST(DescribeFile, AMeshTellsVolumeOnlyWhenItEnclosesOne) {
   EXPECT_FALSE(contains(open, "volume")) << open;
 }
 
+TEST(DescribeFile, AMeshTellsItsStateItsFaultsAndItsFrame) {
+  const TestFolder folder;
+  // Two squares across one another, one of them with a triangle turned. They meet in a line that lies in one of its triangles, from
+  // where it touches the other: three pairs.
+  const std::string crossed = "v 0 0 0\nv 4 0 0\nv 4 0 -4\nv 0 0 -4\nv 1 -1 -1\nv 3 -1 -1\nv 3 1 -1\nv 1 1 -1\nf 1 2 3\nf 1 4 3\nf 5 6 7 8\n";
+  const std::filesystem::path file = folder.write("crossed.obj", crossed);
+  const std::string text = all(file), values = file_facts(file).values;
+  for (const char* part : {"self-intersections: 3 pairs", "not oriented at 1 edge", "2 components", "up axis: the file does not say", "unit: the file does not say; metres are assumed"}) EXPECT_TRUE(contains(text, part)) << part << " in " << text;
+  for (const char* part : {"\"kind\":\"mesh\"", "\"closed\":false", "\"oriented\":false", "\"misoriented_edges\":1", "\"self_intersections\":3", "\"degenerate_triangles\":0", "\"metres_per_unit\":null", "\"volume_m3\":null"})
+    EXPECT_TRUE(contains(values, part)) << part << " in " << values;
+  const std::string own = all(folder.write("own.obj", "# effuse, metres, z up\n# origin: 2667400 6478700 0\n# crs: EPSG:27200\n" + crossed));
+  for (const char* part : {"up axis: z, by its comments", "unit: 1 m, by its comments", "origin on the map: 2667400, 6478700, 0"}) EXPECT_TRUE(contains(own, part)) << part << " in " << own;
+}
+
 TEST(DescribeFile, ASceneTellsItsNameEffectsAndTables) {
   const TestFolder folder;
   const std::string text = all(folder.write("x.toml", "name = \"flank\"\neffects = [\"lava\", \"skin\"]\n[lava]\n[[vents]]\nr = 1\n"));

@@ -7,10 +7,12 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <functional>
 #include <nlohmann/json.hpp>
 
 #include "geometry/base/files.h"
 #include "geometry/mesh/validate.h"
+#include "geometry/remesh/surface_distance.h"
 #include "geometry/terrain/triangulate.h"
 #include "importers/mesh/import_mesh.h"
 #include "importers/terrain/import_dem.h"
@@ -151,7 +153,7 @@ TEST_F(ImportCommandTest, AMeshGoesThroughInALocalFrame) {
   EXPECT_NE(told["report"].dump().find("turned over"), std::string::npos) << told;
   const geometry::TriMesh mesh = importers::import_mesh(folder_ / "out.ply").mesh;
   EXPECT_EQ(mesh.positions[0], Vec3(0.5, 0.25, 100));
-  c.max_error = "1 m";
+  c.resample = "1 m";
   EXPECT_NE(refused(c).find("is for grids"), std::string::npos);
 }
 
@@ -182,6 +184,177 @@ TEST_F(ImportCommandTest, TheProgramTakesItsOptions) {
   EXPECT_EQ(std::system(line.c_str()), 0);
   EXPECT_TRUE(fs::exists(folder_ / "a.glb"));
   EXPECT_EQ(importers::import_dem({folder_ / "a.tif"}).nx, 20) << "every second post of the file";
+}
+
+/// A cliff 8 m high that hangs over by 3 m, between flats, at map coordinates; the sheet is 20 m wide.
+std::string overhang_obj() {
+  std::string text;
+  const double profile[][2] = {{0, 0}, {12, 0}, {9, 4}, {9, 8}, {22, 8}};
+  for (const auto& [x, z] : profile)
+    for (const double y : {0.0, 20.0}) text += fmt::format("v {} {} {}\n", 2667400 + x, 6478700 + y, 100 + z);
+  for (int k = 1; k <= 7; k += 2) text += fmt::format("f {} {} {} {}\n", k, k + 2, k + 3, k + 1);
+  return text;
+}
+
+TEST_F(ImportCommandTest, AMeshIsRepairedUnlessItIsToBeKept) {
+  // A box without its lid, in millimetres, one side wound the other way, one face twice.
+  write_file(folder_ / "box.obj",
+             "v 0 0 0\nv 1000 0 0\nv 1000 1000 0\nv 0 1000 0\nv 0 0 1000\nv 1000 0 1000\nv 1000 1000 1000\nv 0 1000 1000\n"
+             "f 4 3 2 1\nf 1 2 6 5\nf 3 2 6 7\nf 3 4 8 7\nf 4 1 5 8\nf 4 1 5 8\n");
+  ImportCommand c = command(folder_ / "box.obj", "out.ply");
+  c.units = "mm";
+  c.fill_holes = "all";
+  nlohmann::json told = run(c);
+  EXPECT_TRUE(told["mesh"]["closed"].get<bool>()) << told.dump(1);
+  EXPECT_EQ(told["repair"]["duplicate_triangles"], 2);
+  EXPECT_EQ(told["repair"]["turned_triangles"], 2);
+  EXPECT_EQ(told["repair"]["filled_holes"], 1);
+  EXPECT_EQ(told["mesh"]["high"][2], 1.0);
+  c.fill_holes = "1.2 m";
+  told = run(c);
+  EXPECT_EQ(told["repair"]["open_holes"], 1) << "its border is 1.41 m across";
+  c.fill_holes = "";
+  c.keep = true;
+  told = run(c);
+  EXPECT_FALSE(told.contains("repair"));
+  EXPECT_FALSE(told["mesh"]["oriented"].get<bool>());
+  EXPECT_NE(told["report"].dump().find("which axis is up"), std::string::npos);
+  c.units = "";
+  EXPECT_NE(run(c)["report"].dump().find("names no unit: metres are assumed, 1000 m across; millimetres would be 1 m"), std::string::npos);
+}
+
+TEST_F(ImportCommandTest, MillimetresAtMapCoordinatesSurviveEveryFormatThatHoldsThem) {
+  // Three of the mesh's own vertices, as far out as Auckland, to a tenth of a millimetre.
+  const Vec3 at[] = {{2667400.1234, 6479491.2207, 100.0005}, {2667409.8765, 6479491.2212, 101.5}, {2667401.0001, 6479500.9999, 99.9998}};
+  const auto text = [&](const char* format) {
+    std::string out;
+    for (const Vec3& p : at) out += fmt::format(fmt::runtime(format), p.x(), p.y(), p.z());
+    return out;
+  };
+  const std::string ply_head = "ply\nformat ascii 1.0\nelement vertex 3\nproperty double x\nproperty double y\nproperty double z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n";
+  write_file(folder_ / "in.obj", text("v {} {} {}\n") + "f 1 2 3\n");
+  write_file(folder_ / "in.off", "OFF\n3 1 0\n" + text("{} {} {}\n") + "3 0 1 2\n");
+  write_file(folder_ / "in.ply", ply_head + text("{} {} {}\n") + "3 0 1 2\n");
+  write_file(folder_ / "in.stl", "solid a\nfacet normal 0 0 1\nouter loop\n" + text("vertex {} {} {}\n") + "endloop\nendfacet\nendsolid a\n");
+  const auto check = [&](const fs::path& file, const std::string& what) {
+    const importers::MeshImport read = importers::import_mesh(file);
+    ASSERT_EQ(read.mesh.positions.size(), 3u) << what;
+    for (const Vec3& p : at) {
+      double nearest = 1e9;
+      for (const Vec3& q : read.mesh.positions) nearest = std::min(nearest, (q + read.frame.origin - p).norm());
+      EXPECT_LT(nearest, 1e-3) << what << ": of a vertex";
+    }
+    const geometry::Terrain ground = importers::import_terrain(file).terrain;
+    EXPECT_EQ(ground.georeference().origin.head<2>(), Vec2(2667400, 6479491)) << what;
+  };
+  for (const char* in : {"in.obj", "in.off", "in.ply", "in.stl"}) {
+    check(folder_ / in, in);
+    for (const char* out : {"out.ply", "out.obj", "out.glb", "out.stl", "out.off"}) {
+      run(command(folder_ / in, out));
+      check(folder_ / out, fmt::format("{} as {}, relative to its origin", in, out));
+    }
+    for (const char* out : {"map.ply", "map.obj", "map.off"}) {
+      ImportCommand c = command(folder_ / in, out);
+      c.on_map = true;
+      run(c);
+      check(folder_ / out, fmt::format("{} as {}, on the map", in, out));
+      EXPECT_EQ(importers::import_mesh(folder_ / out).frame.origin, Vec3(0, 0, 0));
+    }
+  }
+}
+
+TEST_F(ImportCommandTest, AMeshIsSimplifiedToTheErrorAskedForAndMeasured) {
+  run(command(kWhau, "full.ply"));
+  const geometry::TriMesh full = importers::import_mesh(folder_ / "full.ply").mesh;
+  for (const char* out : {"few.ply", "few.off"}) {
+    ImportCommand c = command(folder_ / "full.ply", out);
+    c.max_error = "2 m";
+    const nlohmann::json told = run(c);
+    EXPECT_LE(told["measured_error_m"].get<double>(), 2.0);
+    const geometry::TriMesh few = importers::import_mesh(folder_ / out).mesh;
+    EXPECT_LT(few.triangles.size(), full.triangles.size() / 10) << told.dump(1);
+    EXPECT_LE(geometry::hausdorff_distance(full, few, 1.5).largest, 2.0) << "measured again, in the file";
+    EXPECT_EQ(told["origin"][0], 2667405) << "its place on the map went along";
+  }
+}
+
+TEST_F(ImportCommandTest, AMeshWithAnOverhangBecomesAGridThatSaysWhatItLost) {
+  write_file(folder_ / "cliff.obj", overhang_obj());
+  ImportCommand c = command(folder_ / "cliff.obj", "cliff.asc");
+  c.cell = "1 m";
+  const nlohmann::json told = run(c);
+  EXPECT_EQ(told["grid"]["nx"], 23);
+  EXPECT_EQ(told["grid"]["ny"], 21);
+  EXPECT_EQ(told["grid"]["holes"], 0);
+  EXPECT_EQ(told["grid"]["roofed"], 4 * 21) << "x from 9 to 12: ground below the edge";
+  EXPECT_EQ(told["grid"]["south_west_post"][0], 2667400.0);
+  const importers::DemGrid grid = importers::import_dem({folder_ / "cliff.asc"});
+  for (int i = 0; i < 23; ++i) EXPECT_EQ(grid.z[static_cast<std::size_t>(5 * 23 + i)], i < 9 ? 100 : 108) << i;
+}
+
+TEST_F(ImportCommandTest, AMeshIsCroppedOnTheMapAndRemeshed) {
+  run(command(kWhau, "full.ply"));
+  ImportCommand c = command(folder_ / "full.ply", "part.glb");
+  c.crop = {2667500.5, 6478800, 2667800, 6479100.25};
+  c.edge = "15 m";
+  const nlohmann::json told = run(c);
+  EXPECT_TRUE(told["mesh"]["manifold"].get<bool>());
+  const double west = told["origin"][0].get<double>() + told["mesh"]["low"][0].get<double>(), north = told["origin"][1].get<double>() + told["mesh"]["high"][1].get<double>();
+  EXPECT_NEAR(west, 2667500.5, 1e-6);
+  EXPECT_NEAR(north, 6479100.25, 1e-6);
+  c.crop = {0, 0, 10, 10};
+  EXPECT_NE(refused(c).find("nothing of it is in the crop: it lies from 2667405"), std::string::npos) << refused(c);
+}
+
+TEST_F(ImportCommandTest, FilesAreReadWithinLimitsThatCanBeRaised) {
+  for (const fs::path& file : {kWhau, fs::path(EFFUSE_SOURCE_DIR) / "samples" / "scenes" / "house.obj"}) {
+    CommonOptions common;
+    common.quiet = true;
+    common.read_limit = "0.0001s";
+    const ImportCommand c = command(file, "out.ply");
+    try {
+      import_terrain_file(c, common);
+      ADD_FAILURE() << file;
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find("is not read after 0.0001 s"), std::string::npos) << error.what();
+    }
+    EXPECT_FALSE(fs::exists(c.output));
+    common.read_limit = "60s,2GB";
+    EXPECT_EQ(import_terrain_file(c, common), ExitCode::kDone);
+    common.read_limit = "60";
+    EXPECT_THROW(import_terrain_file(c, common), InputError);
+    fs::remove(c.output);
+  }
+}
+
+TEST_F(ImportCommandTest, OptionsThatDoNotFitAreRefusedAndNothingIsWritten) {
+  write_file(folder_ / "cliff.obj", overhang_obj());
+  const auto with = [&](auto&& change) {
+    ImportCommand c = command(folder_ / "cliff.obj", "never.ply");
+    change(c);
+    const std::string message = refused(c);
+    EXPECT_FALSE(fs::exists(c.output)) << message;
+    return message;
+  };
+  const std::pair<std::function<void(ImportCommand&)>, const char*> cases[] = {
+      {[](ImportCommand& c) { c.units = "mmm"; }, "--units: no unit of length 'mmm', did you mean 'mm'?"},
+      {[](ImportCommand& c) { c.keep = true, c.fill_holes = "all"; }, "--keep leaves the mesh"},
+      {[](ImportCommand& c) { c.edge = "1 m", c.max_error = "1 m"; }, "wanted one of them"},
+      {[](ImportCommand& c) { c.edge = "0 m"; }, "--edge: edges of 0 m"},
+      {[](ImportCommand& c) { c.edge = "1 mm"; }, "would make about"},
+      {[](ImportCommand& c) { c.max_error = "1 um"; }, "--max-error: 1e-06 m is less"},
+      {[](ImportCommand& c) { c.fill_holes = "big"; }, "--fill-holes: 'big'"},
+      {[](ImportCommand& c) { c.cell = "1 m"; }, "--cell is of a grid"},
+      {[&](ImportCommand& c) { c.output = folder_ / "never.asc"; }, "--cell says how far apart"},
+      {[](ImportCommand& c) { c.resample = "1m"; }, "--resample is for grids"},
+      {[&](ImportCommand& c) { c.output = folder_ / "never.glb", c.on_map = true; }, "--on-map: .glb has no room"},
+      {[](ImportCommand& c) { c.files = {kWhau}, c.up = "y"; }, "--up is for meshes"},
+      {[](ImportCommand& c) { c.files = {kWhau}, c.cell = "5m"; }, "--resample says how far apart posts are"},
+  };
+  for (const auto& [change, wanted] : cases) {
+    const std::string message = with(change);
+    EXPECT_NE(message.find(wanted), std::string::npos) << message << " wanted " << wanted;
+  }
 }
 
 }  // namespace

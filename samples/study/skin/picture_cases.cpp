@@ -20,9 +20,9 @@ namespace fs = std::filesystem;
 using skin::SkinKind;
 
 constexpr SkinKind kKinds[] = {SkinKind::kAa, SkinKind::kPahoehoe, SkinKind::kBlock, SkinKind::kObsidian};
-constexpr int kWidth = 400, kHeight = 300;
+constexpr int kWidth = 320, kHeight = 240;
 constexpr Real kPixels = 1.5;               // of the mesh's edges
-constexpr std::size_t kMostBytes = 400'000;  // of the sheet
+constexpr std::size_t kMostBytes = 200'000;  // of the sheet
 constexpr const char* kSheet = "skin-kinds.jpg";
 
 /// A folder of its own, gone in the end.

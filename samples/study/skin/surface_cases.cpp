@@ -6,6 +6,8 @@
 #include <limits>
 #include <span>
 
+#include "geometry/base/parallel.h"
+#include "geometry/base/random.h"
 #include "samples/study/skin/cases.h"
 #include "samples/study/skin/fill.h"
 #include "samples/study/skin/solids.h"
@@ -108,6 +110,17 @@ void add_measures(CaseResult& result, const SurfaceError& e, const std::string& 
   result.measures.push_back({which + ": closed, oriented, manifold, one piece", "", e.solid ? 1.0 : 0.0, 1, e.solid ? 0.0 : 1.0, 0, ""});
 }
 
+/// How far the farthest point of the true surface is from the nearest ball of a particle, half a spacing in radius: what no surface of such
+/// particles can be sure of.
+Real farthest_from_balls(const Solid& solid, const Particles& particles) {
+  const skin::Regions regions(particles.points(), 1);
+  return parallel_max(kSamples, 0, [&](std::size_t i) {
+    const Vec3 p = solid.point(random_uniform(17, 0, i), random_uniform(17, 1, i), random_uniform(17, 2, i));
+    const Index nearest = regions.nearest(p);
+    return nearest == skin::Regions::kNone ? 0 : (particles.x[nearest] - p).norm() - particles.radius[nearest];
+  });
+}
+
 /// Error against seconds, a curve for each method, a mark for each voxel size.
 struct Curves {
   std::vector<Curve> volume, hausdorff, mean, normal;
@@ -159,9 +172,11 @@ CaseResult surfaces(const Solid& solid, const std::string& file, std::span<const
   CaseResult result;
   Curves curves;
   std::size_t count = 0;
+  std::string balls;
   for (const Filling how : fillings) {
     const Particles particles = particles_of(solid, how);
     count = particles.x.size();
+    balls += fmt::format("{}{:.2f} of the {}'s", balls.empty() ? "" : ", ", farthest_from_balls(solid, particles), name_of(how));
     for (const Method& method : methods) {
       std::vector<Run> runs;
       for (int voxels = 2; voxels <= kFinest; ++voxels) {
@@ -173,8 +188,9 @@ CaseResult surfaces(const Solid& solid, const std::string& file, std::span<const
   }
   result.plots = curves.plots(file, solid.name);
   result.note = fmt::format("{}: {} particles for a volume of {:.1f} spacings cubed. Distances both ways: {} points of the true surface to the mesh, vertices and "
-                            "face centres to the true surface. Seconds are processor time, median of three.",
-                            solid.size, count, solid.volume, kSamples);
+                            "face centres to the true surface. Points of the true surface lie up to so many spacings from the nearest particle's ball of half a spacing: {}. "
+                            "Seconds are processor time, median of three.",
+                            solid.size, count, solid.volume, kSamples, balls);
   return result;
 }
 

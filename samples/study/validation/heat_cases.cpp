@@ -9,80 +9,13 @@
 #include "flow/sph/heat.h"
 #include "samples/study/measure.h"
 #include "samples/study/study.h"
+#include "samples/study/validation/stack.h"
 
 namespace effuse::study {
 
 namespace {
 
 using namespace flow::sph;
-
-constexpr int kAcross = 6;  // particles in a period: two supports
-constexpr Real kSupport = 3;
-
-/// A lattice of particles at rest, endless in x and y, its top layer first: layer k has its middle (k + 1/2) dx below the surface.
-class Stack {
- public:
-  Stack(int layers, Real dx) : layers_(layers), dx_(dx), period_(Vec2::Constant(kAcross * dx)) {
-    for (int k = 0; k < layers; ++k)
-      for (int j = 0; j < kAcross; ++j)
-        for (int i = 0; i < kAcross; ++i) x_.push_back(dx * Vec3(i + 0.5, j + 0.5, -(k + 0.5)));
-    sky_.assign(x_.size(), 0);
-    // Neighbours over the borders: images, then their originals' numbers.
-    std::vector<Vec3> all = x_;
-    std::vector<Index> original(x_.size());
-    std::iota(original.begin(), original.end(), Index{0});
-    const Real support = kSupport * dx;
-    for (int axis = 0; axis < 2; ++axis) {
-      const std::size_t now = all.size();
-      for (std::size_t i = 0; i < now; ++i)
-        for (const Real shift : {period_[axis], -period_[axis]}) {
-          Vec3 y = all[i];
-          y[axis] += shift;
-          if (y[axis] <= -support || y[axis] >= period_[axis] + support) continue;
-          all.push_back(y);
-          original.push_back(original[i]);
-        }
-    }
-    ColumnGrid grid;
-    grid.build(all, support);
-    neighbors_.find(grid, support);
-    for (std::size_t i = 0; i < x_.size(); ++i)
-      for (const Index& j : neighbors_[i]) const_cast<Index&>(j) = original[j];
-  }
-
-  std::size_t size() const { return x_.size(); }
-  int layers() const { return layers_; }
-  Real dx() const { return dx_; }
-  Real area() const { return kAcross * kAcross * dx_ * dx_; }
-  Real depth_of_layer(int k) const { return (k + 0.5) * dx_; }
-  void expose_top() { std::fill_n(sky_.begin(), kAcross * kAcross, dx_ * dx_); }
-
-  HeatBudget step(Heat& heat, Real dt) const {
-    return heat.step(dt, {.x = x_, .neighbors = neighbors_, .kernel = KernelKind::kWendlandC2, .support = kSupport * dx_, .period = period_,
-                          .sky_area = sky_, .ground_area = {}, .ground_temperature = {}, .dissipation = {}});
-  }
-  /// Depth and temperature: the crust columns' cells of the top layer, where it has them, then the layers.
-  Curve profile(const Heat& heat) const {
-    Curve curve;
-    for (const Heat::Level& level : heat.profile(0)) {
-      curve.x.push_back(level.depth);
-      curve.y.push_back(level.temperature);
-    }
-    for (int k = curve.x.empty() ? 0 : 1; k < layers_; ++k) {
-      curve.x.push_back(depth_of_layer(k));
-      curve.y.push_back(heat.temperature()[static_cast<std::size_t>(k) * kAcross * kAcross]);
-    }
-    return curve;
-  }
-
- private:
-  int layers_;
-  Real dx_;
-  std::vector<Vec3> x_;
-  Vec2 period_;
-  Neighbors neighbors_;
-  std::vector<Real> sky_;
-};
 
 /// Where a profile that rises with depth reaches T, on the monotone cubic through its points (Fritsch & Carlson 1980):
 /// straight lines between layers a spacing apart would cut the corner of a front.
@@ -259,9 +192,9 @@ CaseResult radiation_case() {
   const std::vector<Vec3> x = {Vec3::Zero()};
   const std::vector<Real> sky = {d * d};
   ColumnGrid grid;
-  grid.build(x, kSupport * d);
+  grid.build(x, Stack::kSupport * d);
   Neighbors nobody;
-  nobody.find(grid, kSupport * d);
+  nobody.find(grid, Stack::kSupport * d);
   const auto exact = [&](Real t) { return flow::reference::radiative_cooling(T0, 0.9, kDensity, options.curve.heat_capacity, d, t); };
 
   Plot plot{.file = "radiation", .title = "A lump that radiates", .x_label = "time [s]", .y_label = "temperature [K]", .log_x = false, .log_y = false, .curves = {}};
@@ -281,7 +214,7 @@ CaseResult radiation_case() {
     curve.points = true;
     Real worst = 0;
     for (int k = 1; k <= std::lround(86400 / dt); ++k) {
-      heat.step(dt, {.x = x, .neighbors = nobody, .kernel = KernelKind::kWendlandC2, .support = kSupport * d, .period = Vec2::Zero(), .sky_area = sky,
+      heat.step(dt, {.x = x, .neighbors = nobody, .kernel = KernelKind::kWendlandC2, .support = Stack::kSupport * d, .period = Vec2::Zero(), .sky_area = sky,
                      .ground_area = {}, .ground_temperature = {}, .dissipation = {}});
       const Real t = k * dt, T = heat.temperature()[0];
       worst = std::max(worst, relative_error(T, exact(t)));

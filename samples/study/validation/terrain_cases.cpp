@@ -3,52 +3,21 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <filesystem>
 #include <map>
 #include <span>
 #include <vector>
 
-#include "flow/effects/registry.h"
 #include "flow/scene/scene.h"
 #include "flow/scene/simulation.h"
-#include "geometry/base/error.h"
 #include "geometry/base/units.h"
-#include "importers/scene/scene_file.h"
-#include "importers/terrain/import_terrain.h"
-#include "samples/effuse/terrain_options.h"
 #include "samples/study/study.h"
+#include "samples/study/validation/mountain.h"
 #include "samples/study/validation/setups.h"
 
 /// What a flow over a real mountain must keep: volume, heat, and to the outside of the ground.
 namespace effuse::study {
 namespace {
 
-namespace fs = std::filesystem;
-
-/// samples/scenes of the tree this was built from.
-fs::path scenes() { return fs::path(__FILE__).parent_path().parent_path().parent_path() / "scenes"; }
-
-struct Loaded {
-  flow::Scene scene;
-  std::optional<geometry::Terrain> terrain;
-  flow::Node root;
-  std::unique_ptr<flow::Simulation> simulation;
-};
-
-/// A scene file, its skin and output left unread; overrides: key=value each.
-std::unique_ptr<Loaded> load(const fs::path& file, const std::vector<std::string>& overrides) {
-  auto loaded = std::make_unique<Loaded>();
-  loaded->root = importers::read_scene_file(file);
-  for (const std::string& assignment : overrides) importers::apply_override(loaded->root, assignment);
-  flow::Parameters root(loaded->root);
-  loaded->scene = flow::read_scene(root, flow::effect_kinds());
-  if (!root.faults().empty()) throw InputError(root.faults());
-  const flow::Scene& scene = loaded->scene;
-  loaded->terrain =
-      importers::import_terrain(file.parent_path() / scene.terrain.files.at(0), terrain_options(scene.terrain)).terrain;
-  loaded->simulation = std::make_unique<flow::Simulation>(scene, flow::World{&*loaded->terrain, scene.seed});
-  return loaded;
-}
 
 /// Where the scene's first vent lets particles go: a spacing above the ground along its line.
 std::vector<Vec3> release_places(const flow::Node& root, const geometry::Terrain& terrain, Real spacing) {
@@ -94,7 +63,7 @@ Real let_out(const flow::Node& root, Real t) {
 
 // The sample scene on coarse particles, its vent open for two of five minutes.
 CaseResult maunga_whau() {
-  const auto loaded = load(scenes() / "maunga-whau-modern.toml",
+  const auto loaded = load_scene("maunga-whau-modern.toml",
                            {"lava.spacing=1.5 m", "lava.vent[0].rate=140 m3/s", "lava.vent[0].width=3 m", "lava.vent[0].stop=120 s",
                             "lava.vent[0].ramp=10 s", "film.fps=1", "film.time_scale=5", "film.frames=60"});
   flow::Simulation& simulation = *loaded->simulation;
@@ -176,7 +145,7 @@ CaseResult maunga_whau() {
 
 // The sample scene, whole: a flow that comes to rest and sleeps, cools for eleven hours, and is woken by a second vent.
 CaseResult cold_night() {
-  const auto loaded = load(scenes() / "maunga-whau-night.toml", {});
+  const auto loaded = load_scene("maunga-whau-night.toml", {});
   flow::Simulation& simulation = *loaded->simulation;
   const flow::Effect& lava = *simulation.effects().front();
   constexpr double kSecondVent = 41000;

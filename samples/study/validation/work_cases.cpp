@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <limits>
 
 #include "flow/reference/channel.h"
@@ -12,6 +11,8 @@
 #include "geometry/base/check.h"
 #include "geometry/base/error.h"
 #include "geometry/base/parallel.h"
+#include "samples/study/cost/cost.h"
+#include "samples/study/cost/flows.h"
 #include "samples/study/measure.h"
 #include "samples/study/study.h"
 #include "samples/study/validation/setups.h"
@@ -29,45 +30,7 @@ namespace {
 
 constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
 
-/// Of the process [s]: what else runs on the machine does not count, other than by the caches it takes.
-Real processor_time() { return static_cast<Real>(std::clock()) / CLOCKS_PER_SEC; }
-
 }  // namespace
-
-std::vector<WorkPoint> frontier(std::span<const WorkPoint> runs) {
-  std::vector<WorkPoint> sorted;
-  for (const WorkPoint& run : runs)
-    if (std::isfinite(run.error) && std::isfinite(run.seconds)) sorted.push_back(run);
-  std::stable_sort(sorted.begin(), sorted.end(), [](const WorkPoint& a, const WorkPoint& b) { return a.seconds != b.seconds ? a.seconds < b.seconds : a.error < b.error; });
-  std::vector<WorkPoint> best;
-  for (const WorkPoint& run : sorted)
-    if (best.empty() || run.error < best.back().error) best.push_back(run);
-  return best;
-}
-
-Real seconds_for(std::span<const WorkPoint> frontier, Real error) {
-  if (frontier.empty() || !(error >= frontier.back().error)) return kInfinity;
-  if (error >= frontier.front().error) return frontier.front().seconds;
-  std::vector<Real> errors, seconds;
-  for (std::size_t k = frontier.size(); k-- > 0;) {
-    errors.push_back(frontier[k].error);
-    seconds.push_back(frontier[k].seconds);
-  }
-  return interpolate_log(errors, seconds, error);
-}
-
-std::vector<TimeRatio> time_ratios(std::span<const WorkPoint> one, std::span<const WorkPoint> other) {
-  if (one.empty() || other.empty()) return {};
-  std::vector<Real> errors;
-  for (const auto& runs : {one, other})
-    for (const WorkPoint& run : runs)
-      if (run.error >= std::max(one.back().error, other.back().error)) errors.push_back(run.error);
-  std::sort(errors.begin(), errors.end());
-  errors.erase(std::unique(errors.begin(), errors.end()), errors.end());
-  std::vector<TimeRatio> ratios;
-  for (const Real error : errors) ratios.push_back({error, seconds_for(one, error) / seconds_for(other, error)});
-  return ratios;
-}
 
 PeriodicClassic::PeriodicClassic(const ClassicOptions& options, const Vec2& period, std::span<const Vec3> x) : period_(period) {
   CHECK_EQ(flow::evaluations(options.scheme), 1);
@@ -181,115 +144,6 @@ void add_contest(CaseResult& result, const Contest& contest) {
   result.note += ". ";
 }
 
-/// Classic without heat, of one viscosity, the physical one: its sum over a lattice at support 2 lacks 1.8 % of the Laplacian, and 5 % more
-/// viscosity helps a film of five layers as much as it harms one of ten. The support of 2 and the default kernel serve it best, too.
-///   stiffness  k over g H: the square of the speed of sound over that of long waves
-ClassicOptions classic_fluid(Real spacing, Real density, Real nu, Real depth, Real stiffness, Real relaxation) {
-  ClassicOptions options;
-  options.spacing = spacing;
-  options.density = density;
-  options.stiffness = stiffness * kGravity * depth;
-  options.density_relaxation = relaxation;
-  options.viscosity.hot_nu = options.viscosity.cold_nu = nu;
-  options.viscosity.max = nu;
-  options.air_exchange = options.ground_exchange = 0;
-  options.rest_period = 0;
-  return options;
-}
-
-constexpr int kAcrossModern = 6, kAcrossClassic = 4;  // spacings along periodic sides: two supports
-
-// ---- Film ----
-
-/// Means over a while of a film's errors.
-class FilmErrors {
- public:
-  explicit FilmErrors(const reference::NusseltFilm& exact) : exact_(exact) {}
-
-  /// Particles of volume dx^3 on an area of ground, for dt.
-  void add(std::span<const Vec3> x, std::span<const Vec3> v, Real spacing, Real area, Real dt) {
-    Real n = 0, sq = 0, sqq = 0, su = 0, squ = 0, flux = 0, wrong = 0, right = 0;
-    for (std::size_t i = 0; i < x.size(); ++i) {
-      const Real z = x[i].z(), u = v[i].x(), there = exact_.velocity(std::min(z, exact_.depth));
-      flux += u;
-      wrong += (u - there) * (u - there);
-      right += there * there;
-      // The surface's speed is that of u = a + b (H - z)^2 through the upper half.
-      if (z < exact_.depth / 2) continue;
-      const Real q = (exact_.depth - z) * (exact_.depth - z);
-      n += 1, sq += q, sqq += q * q, su += u, squ += q * u;
-    }
-    time_ += dt;
-    surface_ += dt * (su * sqq - squ * sq) / (n * sqq - sq * sq);
-    flux_ += dt * flux * std::pow(spacing, 3) / area;
-    l2_squared_ += dt * wrong / right;
-  }
-  /// Of the profile, relative, over all particles and the time.
-  Real l2() const { return std::sqrt(l2_squared_ / time_); }
-  /// The larger error of the mean surface speed and the mean flux.
-  Real surface_and_flux() const {
-    return std::max(relative_error(surface_ / time_, exact_.surface_speed()), relative_error(flux_ / time_, exact_.flux()));
-  }
-
- private:
-  reference::NusseltFilm exact_;
-  Real time_ = 0, surface_ = 0, flux_ = 0, l2_squared_ = 0;
-};
-
-struct FilmWork {
-  Real seconds = 0, l2 = 0, surface_and_flux = 0;
-};
-
-// The viscosity that suits classic best while inertia is small (Re 0.5): its two limits of the step, of sound and of viscosity, are equal at ten
-// layers. Ten times the viscosity takes it ten times the steps a second and ten times the seconds to shear the film as far; modern's steps get
-// longer.
-constexpr Real kFilmViscosity = 2000, kFilmDensity = 2600, kFilmDepth = 1, kFilmSlope = 5 * kPi / 180;
-constexpr Real kFilmEnd = 8;  // [s]: steady to 1e-3 by half of that; sheared by 9, so that nothing is left of the lattice
-const Vec3 kFilmGravity = kGravity * Vec3(std::sin(kFilmSlope), 0, -std::cos(kFilmSlope));
-const reference::NusseltFilm kFilm{kFilmDepth, kFilmSlope, kFilmViscosity / kFilmDensity};
-
-FilmWork modern_film(int layers) {
-  const Real dx = kFilmDepth / layers, side = kAcrossModern * dx;
-  ModernOptions options = isothermal(dx, kFilmViscosity);
-  options.density = kFilmDensity;
-  options.gravity = kFilmGravity;
-  options.period = Vec2::Constant(side);
-  ModernLava lava(options, {}, {plane(Vec3::UnitZ(), Vec3::Zero())});
-  add_at_rest(lava, block(Vec3::Zero(), {kAcrossModern, kAcrossModern, layers}, dx));
-  FilmErrors errors(kFilm);
-  FilmWork work;
-  while (kFilmEnd - lava.time() > 1e-9 * kFilmEnd) {
-    const Real before = processor_time();
-    const Real dt = lava.step(kFilmEnd - lava.time()).dt;
-    work.seconds += processor_time() - before;
-    if (lava.time() > kFilmEnd / 2) errors.add(lava.positions(), lava.velocities(), dx, side * side, dt);
-  }
-  work.seconds *= kFilmDepth * kFilmDepth / (side * side);
-  work.l2 = errors.l2();
-  work.surface_and_flux = errors.surface_and_flux();
-  return work;
-}
-
-FilmWork classic_film(int layers, Real stiffness) {
-  const Real dx = kFilmDepth / layers, side = kAcrossClassic * dx;
-  ClassicOptions options = classic_fluid(dx, kFilmDensity, kFilm.nu, kFilmDepth, stiffness, 0.1);
-  options.gravity = kFilmGravity;
-  PeriodicClassic flow(options, Vec2::Constant(side), block(Vec3::Zero(), {kAcrossClassic, kAcrossClassic, layers}, dx));
-  FilmErrors errors(kFilm);
-  FilmWork work;
-  try {
-    flow.run_until(kFilmEnd, [&](Real dt) {
-      if (flow.lava().time() > kFilmEnd / 2) errors.add(flow.positions(), flow.velocities(), dx, side * side, dt);
-    });
-    work.l2 = errors.l2();
-    work.surface_and_flux = errors.surface_and_flux();
-  } catch (const UnstableError&) {
-    work.l2 = work.surface_and_flux = kInfinity;
-  }
-  work.seconds = flow.seconds() * kFilmDepth * kFilmDepth / (side * side);
-  return work;
-}
-
 CaseResult work_film() {
   const ThreadLimit one(1);
   const std::string seconds = "processor time for a film as wide and long as deep [s]";
@@ -311,95 +165,17 @@ CaseResult work_film() {
   result.note = fmt::format("5 degrees, H = 1 m, mu = {} Pa s, means over the second half of {} s from rest; one thread. Modern with its defaults, classic with the support, "
                             "stiffness and density relaxation (0.1) that were found to serve it best. In surface speed and flux errors of either sign cancel, in classic's "
                             "and in modern's: the profile is the better judge. ",
-                            kFilmViscosity, kFilmEnd);
+                            kFilmViscosity, kFilmSeconds);
   add_contest(result, profile);
   add_contest(result, means);
   return result;
-}
-
-// ---- BM1 ----
-
-struct FrontWork {
-  Real seconds = 0, error = 0;
-};
-
-/// As far as classic can be paid for: its steps are as short at 550 s as at the beginning. Its front starts ahead of the reference and falls
-/// behind from about 25 s on: the mean over a shorter time would be that of a change of sign.
-const std::vector<Real> kFrontTimes = {10, 25, 50, 100};
-
-/// The dam as whole particles fill it.
-reference::DamBreak dam_of(int layers) {
-  reference::DamBreak dam;
-  dam.length = std::round(dam.length * layers / dam.depth) * dam.depth / layers;
-  return dam;
-}
-std::vector<Vec3> both_halves(const reference::DamBreak& dam, int layers, int across) {
-  const Real dx = dam.depth / layers;
-  return block(Vec3(-dam.length, 0, 0), {2 * static_cast<int>(std::lround(dam.length / dx)), across, layers}, dx);
-}
-
-/// Relative error of the front, of a run with such fronts at kFrontTimes: root mean square.
-class FrontErrors {
- public:
-  explicit FrontErrors(const reference::DamBreak& dam) : exact_(reference::solve_dam_break(dam, kFrontTimes)) {}
-  void add(std::span<const Vec3> x, Real spacing) {
-    const Real front = (front_position(x, Vec3::UnitX(), spacing) + front_position(x, -Vec3::UnitX(), spacing)) / 2;
-    sum_ += std::pow(front / exact_[count_++].front - 1, 2);
-  }
-  Real rms() const { return std::sqrt(sum_ / static_cast<Real>(count_)); }
-
- private:
-  std::vector<reference::DamBreakState> exact_;
-  std::size_t count_ = 0;
-  Real sum_ = 0;
-};
-
-FrontWork modern_front(int layers, Real max_step) {
-  const reference::DamBreak dam = dam_of(layers);
-  const Real dx = dam.depth / layers, density = 2700, width = kAcrossModern * dx;
-  ModernOptions options = isothermal(dx, dam.nu * density);
-  options.density = density;
-  options.period = Vec2(0, width);
-  ModernLava lava(options, {}, {plane(Vec3::UnitZ(), Vec3::Zero())});
-  add_at_rest(lava, both_halves(dam, layers, kAcrossModern));
-  FrontErrors errors(dam);
-  FrontWork work;
-  RunStatistics statistics;
-  for (const Real t : kFrontTimes) {
-    const Real before = processor_time();
-    run_until(lava, t, max_step, statistics);
-    work.seconds += processor_time() - before;
-    errors.add(lava.positions(), dx);
-  }
-  work.seconds /= width;
-  work.error = errors.rms();
-  return work;
-}
-
-FrontWork classic_front(int layers, Real relaxation) {
-  const reference::DamBreak dam = dam_of(layers);
-  const Real dx = dam.depth / layers, width = kAcrossClassic * dx;
-  PeriodicClassic flow(classic_fluid(dx, 2700, dam.nu, dam.depth, 100, relaxation), Vec2(0, width), both_halves(dam, layers, kAcrossClassic));
-  FrontErrors errors(dam);
-  FrontWork work;
-  try {
-    for (const Real t : kFrontTimes) {
-      flow.run_until(t);
-      errors.add(flow.positions(), dx);
-    }
-    work.error = errors.rms();
-  } catch (const UnstableError&) {
-    work.error = kInfinity;
-  }
-  work.seconds = flow.seconds() / width;
-  return work;
 }
 
 CaseResult work_bm1() {
   const ThreadLimit one(1);
   Contest front{"work_bm1", "BM1 viscous dam break: work against precision", "front, rms", "processor time for a metre of width [s]", {}, {}};
   for (const auto& [layers, max_step] : {std::pair{2, 1.0}, {3, 1.0}, {3, 0.5}, {4, 1.0}, {5, 1.0}, {5, 0.5}, {5, 0.2}, {8, 1.0}}) {
-    const FrontWork work = best_of_many([&] { return modern_front(layers, max_step); });
+    const FrontWork work = best_of_many([&] { return modern_front(layers, [&](ModernOptions& o) { o.max_step = max_step; }); });
     front.modern.push_back({fmt::format("{} layers, steps up to {} s", layers, max_step), work.seconds, work.error});
   }
   for (const auto& [layers, relaxation] : {std::pair{2, 0.02}, {2, 0.3}, {2, 1.0}, {3, 0.3}, {3, 1.0}, {4, 0.3}}) {

@@ -8,6 +8,7 @@
 #include "flow/sph/lava_presets.h"
 #include "geometry/base/error.h"
 #include "geometry/base/units.h"
+#include "geometry/terrain/plane.h"
 #include "tests/flow/effects/scene_lines.h"
 
 /// What the table [lava] says, and what it must not say.
@@ -184,6 +185,27 @@ INSTANTIATE_TEST_SUITE_P(
               "particles of this size"},
         Wrong{"rest_period", {{"lava.rest_period", "1e-9 s"}}, "lava.rest_period: must be 0 s"}),
     [](const testing::TestParamInfo<Wrong>& i) { return std::string(i.param.name); });
+
+TEST(ReadLava, RefusesParticlesTooLargeForTheGroundOrForAVent) {
+  const geometry::Terrain ground = geometry::Terrain::from_height_field(geometry::make_plane(Vec2(40, 40), 0, 0, 8), {}, 288);
+  World world;
+  world.terrain = &ground;
+  const auto faults_of = [&](const char* spacing, const char* width) {
+    Read r = read(scene_of({{"lava.spacing", spacing}, {"lava.vent[0].at", "[5, 5]"}, {"lava.vent[0].width", width}, {"lava.vent[0].rate", "2 m3/s"}}));
+    EXPECT_EQ(r.faults, "");
+    return r.plan.misfits(world);
+  };
+  for (const char* spacing : {"1.8e9", "1e300", "11 m"}) {
+    const std::vector<Fault> faults = faults_of(spacing, "3 m");
+    ASSERT_EQ(faults.size(), 1u) << spacing;
+    EXPECT_TRUE(contains(faults[0].message, "on a terrain 40 m across, wanted at least 4 side by side: 10 m or less")) << faults[0].message;
+    EXPECT_GT(faults[0].place.line, 0);
+  }
+  EXPECT_EQ(faults_of("9 m", "3 m").size(), 0u);
+  const std::vector<Fault> faults = faults_of("9 m", "1 m");
+  ASSERT_EQ(faults.size(), 1u);
+  EXPECT_TRUE(contains(faults[0].message, "from a vent 1 m across")) << faults[0].message;
+}
 
 TEST(ReadLava, ToldFaultsAreAllOfThemAtOnce) {
   const Read r =

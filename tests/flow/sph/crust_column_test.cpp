@@ -77,6 +77,17 @@ TEST(ColumnShape, FillsTheDepthInAGeometricSeries) {
   }
 }
 
+TEST(ColumnShape, FewerCellsFillItToo) {
+  for (const int cells : {2, 5, 16}) {
+    const ColumnShape shape(1.0 / 200, cells);
+    EXPECT_EQ(shape.cells, cells);
+    EXPECT_NEAR(std::accumulate(shape.share.begin(), shape.share.end(), 0.0), 1, 1e-14);
+    EXPECT_NEAR(shape.share[0], 1.0 / 200, 1e-9);
+    EXPECT_EQ(std::count(shape.share.begin(), shape.share.end(), 0.0), kColumnCells - cells);
+  }
+  EXPECT_NEAR(ColumnShape(1, 4).share[0], 0.25, 1e-12) << "no wider than an equal share";
+}
+
 // No latent heat, no radiation: in the end a straight profile carries dT / (sum of resistances).
 TEST(CrustColumnStep, SettlesToTheSteadyFluxThroughThreeResistances) {
   const ColumnShape shape(1.0 / 200);

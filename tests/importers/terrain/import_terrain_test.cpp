@@ -244,7 +244,7 @@ TEST(ImportTerrain, AMeshWithYUpIsToldAndCanBeTurned) {
   const std::filesystem::path file = folder.write("yup.obj", "v 0 3 0\nv 10 3 0\nv 10 3 10\nv 0 3 10\nf 4 3 2 1\n");
   EXPECT_TRUE(contains(notes_of(import_terrain(file).notes), "y may be up"));
   TerrainImportOptions options;
-  options.y_up = true;
+  options.mesh.up = UpAxis::kY;
   const TerrainImport turned = import_terrain(file, options);
   EXPECT_EQ(turned.terrain.bounds().min().z(), 3);
   EXPECT_FALSE(contains(notes_of(turned.notes), "turned over")) << notes_of(turned.notes);
@@ -276,7 +276,7 @@ TEST(ImportTerrainSharedData, RealGroundMeshesLoad) {
   EXPECT_NEAR(hill.terrain.bounds().min().z(), 937.3, 0.01);
   EXPECT_NEAR(hill.terrain.bounds().max().z(), 1044.6, 0.05);
   TerrainImportOptions options;
-  options.y_up = true;
+  options.mesh.up = UpAxis::kY;
   const TerrainImport peaks = import_terrain(data / "meshes/terrain-meshes/three_peaks.off", options);
   EXPECT_EQ(peaks.terrain.mesh().triangles.size(), 3671u);
   EXPECT_TRUE(contains(notes_of(peaks.notes), "turned over")) << "its normals point to -y";
