@@ -261,7 +261,7 @@ EffectPlan read_elastic(Parameters& parameters, Real duration) {
   const Real tets = cubes * (settings.form.box.minCoeff() > 0 ? 5 : 12);
   plan.estimate.bytes = 3000 * tets;
   plan.estimate.steps = std::ceil(duration / settings.step);
-  plan.estimate.seconds = plan.estimate.steps * tets * 3e-5;
+  plan.estimate.seconds = plan.estimate.steps * tets * 1e-5;
   plan.misfits = [settings](const World& world) {
     std::vector<Fault> faults;
     make_shape(settings, world, faults);
