@@ -12,6 +12,9 @@
 #include "geometry/mesh/measure.h"
 #include "geometry/mesh/self_intersections.h"
 #include "geometry/mesh/validate.h"
+#include "geometry/motion/walk.h"
+#include "importers/clips/read_bvh.h"
+#include "importers/clips/read_points.h"
 #include "importers/input_file.h"
 #include "importers/mesh/import_mesh.h"
 #include "importers/scene/scene_file.h"
@@ -199,10 +202,35 @@ Lines describe_scene(const fs::path& file) {
   return lines;
 }
 
+Lines describe_skeleton(const fs::path& file) {
+  const geometry::SkeletonClip clip = read_bvh(file, 1);
+  Real travelled = 0;
+  for (std::size_t f = 1; f < clip.frames.size(); ++f) travelled += (clip.frames[f].root - clip.frames[f - 1].root).head<2>().norm();
+  Box3 box;
+  for (const geometry::RigidPose& joint : geometry::forward_kinematics(clip.joints, clip.frames.front())) box.extend(joint.position);
+  std::string names;
+  for (const geometry::ClipJoint& joint : clip.joints) names += (names.empty() ? "" : ", ") + printable(joint.name, 40);
+  return {fmt::format("motion capture: {} joints, {} frames of {:.6g} s, {:.6g} s", clip.joints.size(), clip.frames.size(), clip.frame_time, clip.length()),
+          fmt::format("in the file's own unit: {:.4g} tall in its first frame, goes {:.4g} along the ground", box.sizes().z(), travelled),
+          fmt::format("legs: {}", geometry::find_legs(clip.joints).size()), "joints: " + names};
+}
+
+Lines describe_points(const fs::path& file) {
+  const geometry::PointClip clip = read_points(file);
+  std::size_t missing = 0;
+  std::string names;
+  for (const auto& frame : clip.frames) missing += static_cast<std::size_t>(std::count_if(frame.begin(), frame.end(), [](const Vec3& p) { return !p.allFinite(); }));
+  for (const std::string& name : clip.names) names += (names.empty() ? "" : ", ") + printable(name, 40);
+  return {fmt::format("markers: {} points, {} frames of {:.6g} s, {:.6g} s", clip.names.size(), clip.frames.size(), clip.frame_time, clip.length()),
+          fmt::format("not seen: {} of {} places", missing, clip.names.size() * clip.frames.size()), "points: " + names};
+}
+
 }  // namespace
 
 FileFacts file_facts(const fs::path& file, const ReadLimits& limits) {
   if (lower_extension(file) == ".toml") return {describe_scene(file), ""};
+  if (lower_extension(file) == ".bvh") return {describe_skeleton(file), ""};
+  if (lower_extension(file) == ".trc") return {describe_points(file), ""};
   return is_dem(file) ? describe_grid(file, limits) : describe_mesh(file, limits);
 }
 

@@ -34,11 +34,14 @@ PlannedVent read_vent(Parameters& p, Real temperature) {
     planned.from = planned.to = point("at", true, "centre of a round vent, in the terrain's map coordinates");
   }
   vent.width = p.number("width", "m", std::nullopt, Parameters::positive(), "width of the fissure, or diameter of the round vent");
-  vent.rate = p.number("rate", "m3/s", std::nullopt, Parameters::not_negative(), "volume let out a second");
+  const geometry::Curve<Real> rates = p.curve("rate", "m3/s", std::nullopt, Parameters::not_negative(), "volume let out a second; or by keys of simulated time");
+  vent.rate = geometry::extremes(rates).second;
+  if (rates.keys().size() > 1) vent.rates = rates;
   vent.temperature = p.number("temperature", "K", temperature, {500, 2500}, "of the lava that comes out; the preset's, if there is one");
   vent.start = p.number("start", "s", 0, Parameters::not_negative(), "when it opens (simulated time)");
   vent.stop = p.number("stop", "s", 1e9, Parameters::positive(), "when it closes");
   vent.ramp = p.number("ramp", "s", 0, Parameters::not_negative(), "time over which the rate grows after start and falls before stop");
+  if (vent.rates && vent.ramp > 0) p.fault("ramp", "goes with one rate; keys say how the rate grows and falls");
   if (vent.stop <= vent.start) p.fault("stop", fmt::format("the vent closes at {} s, before it opens at {} s", vent.stop, vent.start));
   return planned;
 }

@@ -33,10 +33,11 @@ struct World {
   std::function<geometry::TriMesh(const PlannedForm&)> mesh = {};
 };
 
-/// A surface of one moment, for files (frames/NAME.####.ply) and pictures; "color" is linear light.
+/// A surface of one moment, for files (frames/NAME.####.ply) and pictures; "color" is linear light, "glow" what shines of itself.
 struct NamedMesh {
   std::string name;
   geometry::TriMesh mesh;
+  Real since = -1;  ///< it has been the same, bit for bit, from this time on [s]; negative: it may have changed just now
 };
 
 /// Particles of one moment that are drawn one by one.
@@ -109,6 +110,9 @@ class Effect {
   virtual std::vector<SolidPiece> pieces() const { return {}; }
   /// Whether there ever may be pieces that belong to no body of the scene.
   virtual bool makes_pieces() const { return false; }
+
+  /// Where it burns: middles and half heights of flames, their temperature, and the speed of what rises.
+  virtual geometry::Points fires() const { return {}; }
   /// Surfaces of its own; their names do not change through a run.
   virtual std::vector<NamedMesh> meshes() const { return {}; }
   /// Particles to draw, not to skin, for files (frames/NAME.####.ply) and pictures. Names do not change through a run.

@@ -469,6 +469,86 @@ std::vector<std::vector<Real>> Parameters::number_lists(const std::string& key, 
   return lists;
 }
 
+namespace {
+const std::vector<std::string> kWays = {"linear", "hold", "smooth", "catmull_rom", "bezier"};
+constexpr geometry::Between kWayBetween[] = {geometry::Between::kLinear, geometry::Between::kStep, geometry::Between::kCatmullRom, geometry::Between::kCatmullRom, geometry::Between::kBezier};
+constexpr std::size_t kSmoothWay = 2, kBezierWay = 4;
+}  // namespace
+
+geometry::Curve<Real> Parameters::curve(const std::string& key, std::string_view unit, std::optional<Real> fallback, Range range, std::string_view what) {
+  const Node* node = table_->node ? table_->node->find(key) : nullptr;
+  if (!node || node->kind != Node::Kind::kArray) return geometry::Curve<Real>(number(key, unit, fallback, range, what));
+  table_->entry(key);  // its place among the resolved
+  shared_->document(joined(table_->doc_path, key), plain(unit) ? "" : std::string(unit), fallback ? format_quantity(*fallback, plain(unit) ? "" : unit) : "", what);
+  const std::size_t usual = choice("motion", {"linear", "hold", "smooth", "catmull_rom"}, 0, "from key to key, of numbers given by keys");
+
+  const std::string wanted = fmt::format("keys [[time, {}], ...], the times rising", plain(unit) ? std::string("number") : fmt::format("number in {}", unit));
+  std::vector<geometry::Key<Real>> keys;
+  std::vector<std::size_t> ways;
+  Node resolved;
+  resolved.kind = Node::Kind::kArray;
+  resolved.place = node->place;
+  const std::size_t faults_before = shared_->faults.size();
+  for (std::size_t i = 0; i < node->items.size(); ++i) {
+    const Node& item = node->items[i];
+    const auto wrong = [&](const Node& at, const std::string& message) { shared_->faults.push_back({at.place, fmt::format("{}[{}]: {}", joined(path_, key), i, message)}); };
+    if (item.kind != Node::Kind::kArray || item.items.size() < 2) {
+      wrong(item, fmt::format("found {}, wanted {}", item.kind == Node::Kind::kArray ? fmt::format("an array of {}", item.items.size()) : shown(item), wanted));
+      continue;
+    }
+    geometry::Key<Real> k;
+    std::size_t way = usual;
+    const auto read = [&](std::size_t n, std::string_view of) {
+      try {
+        return number_of(item.items[n], of);
+      } catch (const std::invalid_argument& error) {
+        wrong(item.items[n], error.what());
+        return Real{0};
+      }
+    };
+    k.time = read(0, "s");
+    k.value = read(1, unit);
+    if (!inside(k.value, range)) wrong(item.items[1], fmt::format("{} is out of range, must be {}", shown(item.items[1]), range_text(range, unit)));
+    if (!keys.empty() && !(k.time > keys.back().time)) wrong(item.items[0], fmt::format("{} does not come after the key before, at {} s", shown(item.items[0]), keys.back().time));
+    if (item.items.size() > 2) {
+      const auto named = item.items[2].kind == Node::Kind::kText ? index_of(item.items[2].text, kWays) : std::nullopt;
+      if (!named) wrong(item.items[2], fmt::format("found {}, wanted how it goes to the next key; {}", shown(item.items[2]), item.items[2].kind == Node::Kind::kText ? suggestion(item.items[2].text, kWays) : "there are: " + list(kWays, ", ")));
+      way = named.value_or(usual);
+    }
+    const std::size_t count = way == kBezierWay ? 5 : 3;
+    if (item.items.size() > count || (way == kBezierWay && item.items.size() < count)) wrong(item, fmt::format("found {} entries, wanted [time, value, \"{}\"{}]", item.items.size(), kWays[way], way == kBezierWay ? ", slope leaving, slope arriving" : ""));
+    k.between = kWayBetween[way];
+    if (way == kBezierWay && item.items.size() == count) k.out = read(3, ""), k.in = read(4, "");
+    Node of_key = item;
+    of_key.items[0] = number_node(k.time, "s", item.items[0].place);
+    of_key.items[1] = number_node(k.value, unit, item.items[1].place);
+    resolved.items.push_back(std::move(of_key));
+    keys.push_back(k);
+    ways.push_back(way);
+  }
+  if (node->items.empty()) fault(key, "found an empty array, wanted " + wanted);
+  const geometry::Curve<Real> nothing(fallback.value_or(0));
+  if (shared_->faults.size() > faults_before || keys.empty()) return nothing;
+  // A key says what arrives at the next; a curve's keys what arrives at them.
+  for (std::size_t k = keys.size(); k-- > 0;) keys[k].in = k > 0 && ways[k - 1] == kBezierWay ? keys[k - 1].in : 0;
+  std::vector<geometry::Key<Real>> smooth = geometry::without_overshoot(keys);
+  for (std::size_t k = 0; k < keys.size(); ++k) {
+    if (ways[k] != kSmoothWay) continue;
+    keys[k].between = smooth[k].between;
+    keys[k].out = smooth[k].out;
+    if (k + 1 < keys.size()) keys[k + 1].in = smooth[k + 1].in;
+  }
+  table_->entry(key).value = std::move(resolved);
+  const geometry::Curve<Real> curve(std::move(keys));
+  const auto [least, most] = geometry::extremes(curve);
+  const Real slack = 1e-9 * (1 + std::max(std::abs(least), std::abs(most)));
+  if (least < range.low - slack || most > range.high + slack) {
+    fault(key, fmt::format("reaches {:g} between its keys, must be {}: \"smooth\" stays between them", least < range.low - slack ? least : most, range_text(range, unit)));
+    return nothing;
+  }
+  return curve;
+}
+
 Parameters Parameters::table(const std::string& key, std::string_view what) {
   Table::Entry& entry = table_->entry(key);
   const std::string doc_path = joined(table_->doc_path, key);

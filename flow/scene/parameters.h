@@ -9,6 +9,7 @@
 
 #include "flow/scene/node.h"
 #include "geometry/base/types.h"
+#include "geometry/motion/curve.h"
 
 namespace effuse::flow {
 
@@ -40,6 +41,11 @@ class Parameters {
 
   /// A number with a dimension: a bare number is SI, text carries its unit. No default: required.
   Real number(const std::string& key, std::string_view unit, std::optional<Real> fallback, Range range, std::string_view what);
+  /// A number that may change: one number, or keys [["0 s", "1 m3/s"], ["10 s", "5 m3/s"]], the time first. How it goes on to the next key
+  /// says the key, third, or else the table's `motion`: "linear" (the default), "hold", "smooth" (no value beyond its two keys'),
+  /// "catmull_rom", or "bezier" with two more numbers, the slopes [unit/s] leaving this key and arriving at the next. Values between keys
+  /// must be in range, too.
+  geometry::Curve<Real> curve(const std::string& key, std::string_view unit, std::optional<Real> fallback, Range range, std::string_view what);
   std::int64_t integer(const std::string& key, std::optional<std::int64_t> fallback, std::int64_t low, std::int64_t high, std::string_view what);
   bool flag(const std::string& key, bool fallback, std::string_view what);
   std::string text(const std::string& key, std::optional<std::string> fallback, std::string_view what);

@@ -50,6 +50,7 @@ Scene read_scene(Parameters& root, std::span<const EffectKind> kinds) {
   scene.terrain = read_terrain_settings(root);
 
   scene.obstacles = read_obstacles(root);
+  scene.figures = read_figures(root);
   scene.bodies = read_bodies(root, scene.seed);
   scene.joints = read_joints(root, scene.obstacles, scene.bodies);
   if (root.has("bodies") || !scene.bodies.empty()) {
@@ -74,7 +75,7 @@ Scene read_scene(Parameters& root, std::span<const EffectKind> kinds) {
       scene.effects.push_back(std::move(plan));
     }
   }
-  if (scene.effects.empty() && !(scene.obstacles.empty() && scene.bodies.empty())) {
+  if (scene.effects.empty() && !(scene.obstacles.empty() && scene.bodies.empty() && scene.figures.empty())) {
     const Node nothing;
     Parameters told(nothing);  // its own table has been read
     for (const EffectKind& kind : kinds) {

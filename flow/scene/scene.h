@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "flow/scene/effect.h"
+#include "flow/scene/figures.h"
 #include "flow/scene/joints.h"
 #include "flow/scene/parameters.h"
 #include "flow/scene/terrain_settings.h"
@@ -21,6 +22,7 @@ struct Scene {
   Real time_scale = 1;          ///< simulated seconds a second of film
   TerrainSettings terrain;
   std::vector<PlannedObstacle> obstacles;
+  std::vector<PlannedFigure> figures;
   std::vector<PlannedBody> bodies;
   std::vector<PlannedJoint> joints;
   BodySettings body_settings;
@@ -30,7 +32,7 @@ struct Scene {
   Real frame_time(int n) const { return n * time_scale / fps; }
 };
 
-/// Reads the tables [film], [terrain], [[obstacle]], [[body]], [[joint]], [bodies] and one for each effect of kinds that the scene names.
+/// Reads the tables [film], [terrain], [[obstacle]], [[figure]], [[body]], [[joint]], [bodies] and one for each effect of kinds that the scene names.
 /// Where it names none, the kind of_solids steps its bodies and obstacles. Faults stay in root: the caller reads on and calls root.finish().
 Scene read_scene(Parameters& root, std::span<const EffectKind> kinds);
 

@@ -37,6 +37,7 @@ std::vector<Vec3> Vent::lattice(Real spacing) const {
 Real Vent::volume(Real t) const {
   const Real end = std::min(t, stop);
   if (end <= start) return 0;
+  if (rates) return geometry::integral(*rates, start, end);
   if (ramp <= 0) return rate * (end - start);
   // Trapezoid: up over `ramp`, down over `ramp` before stop; both shortened when the vent is brief.
   const Real up = std::min(ramp, (stop - start) / 2);

@@ -2,10 +2,12 @@
 
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "geometry/base/types.h"
+#include "geometry/motion/curve.h"
 
 namespace effuse::flow::sph {
 
@@ -20,7 +22,8 @@ struct Vent {
   Vec3 from = Vec3::Zero();  ///< [m], centre line of a fissure; from = to: a round crater vent. Sites
   Vec3 to = Vec3::Zero();    ///< are moved up or down onto the ground.
   Real width = 0;            ///< [m], of the fissure, or the crater vent's diameter
-  Real rate = 0;             ///< [m^3/s]
+  Real rate = 0;             ///< [m^3/s]; the largest where it changes
+  std::optional<geometry::Curve<Real>> rates;  ///< [m^3/s] by time [s], >= 0, instead of rate and ramp
   Real temperature = 0;      ///< [K]
   Real start = 0;            ///< [s]
   Real stop = std::numeric_limits<Real>::infinity();  ///< [s]

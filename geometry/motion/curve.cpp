@@ -85,6 +85,75 @@ template class Curve<Real>;
 template class Curve<Vec2>;
 template class Curve<Vec3>;
 
+Real integral(const Curve<Real>& curve, Real from, Real to) {
+  if (to < from) return -integral(curve, to, from);
+  const std::span<const Key<Real>> keys = curve.keys();
+  CHECK(!keys.empty());
+  // Simpson's rule is exact for cubics; a step's jump lies at a stretch's end and is left out.
+  Real sum = 0, a = from;
+  for (std::size_t k = 0; k <= keys.size() && a < to; ++k) {
+    const Real b = k < keys.size() ? std::min(keys[k].time, to) : to;
+    if (b <= a) continue;
+    const Real middle = curve.at((a + b) / 2);
+    const bool flat = k == 0 || k == keys.size() || keys[k - 1].between == Between::kStep;
+    sum += flat ? (b - a) * middle : (b - a) / 6 * (curve.at(a) + 4 * middle + curve.at(b));
+    a = b;
+  }
+  return sum;
+}
+
+std::pair<Real, Real> extremes(const Curve<Real>& curve) {
+  const std::span<const Key<Real>> keys = curve.keys();
+  CHECK(!keys.empty());
+  Real least = keys[0].value, most = least;
+  const auto take = [&](Real v) {
+    least = std::min(least, v);
+    most = std::max(most, v);
+  };
+  for (std::size_t k = 0; k < keys.size(); ++k) {
+    take(keys[k].value);
+    if (k + 1 == keys.size() || keys[k].between == Between::kStep || keys[k].between == Between::kLinear) continue;
+    // Where the slope, a parabola in u, is 0: from its values at the ends and in the middle.
+    const Real span = keys[k + 1].time - keys[k].time, edge = 1e-12 * span;
+    const Real s0 = curve.slope(keys[k].time), sm = curve.slope(keys[k].time + span / 2), s1 = curve.slope(keys[k + 1].time - edge);
+    const Real a = 2 * s0 - 4 * sm + 2 * s1, b = -3 * s0 + 4 * sm - s1, c = s0;
+    const auto at = [&](Real u) {
+      if (u > 0 && u < 1) take(curve.at(keys[k].time + u * span));
+    };
+    if (std::abs(a) < 1e-14 * (std::abs(b) + std::abs(c))) {
+      if (b != 0) at(-c / b);
+    } else if (const Real d = b * b - 4 * a * c; d >= 0) {
+      at((-b + std::sqrt(d)) / (2 * a));
+      at((-b - std::sqrt(d)) / (2 * a));
+    }
+  }
+  return {least, most};
+}
+
+std::vector<Key<Real>> without_overshoot(std::vector<Key<Real>> keys) {
+  check_times(keys);
+  const std::size_t n = keys.size();
+  const auto rise = [&](std::size_t k) { return (keys[k + 1].value - keys[k].value) / (keys[k + 1].time - keys[k].time); };
+  std::vector<Real> slope(n, 0);
+  for (std::size_t k = 0; k < n && n > 1; ++k) {
+    if (k == 0 || k + 1 == n) {
+      slope[k] = rise(k == 0 ? 0 : n - 2);
+      continue;
+    }
+    const Real before = rise(k - 1), after = rise(k), h0 = keys[k].time - keys[k - 1].time, h1 = keys[k + 1].time - keys[k].time;
+    if (before * after <= 0) continue;
+    const Real steepest = 3 * std::min(std::abs(before), std::abs(after)), parabola = (before * h1 + after * h0) / (h0 + h1);
+    slope[k] = std::copysign(std::min(std::abs(parabola), steepest), parabola);
+  }
+  for (std::size_t k = 0; k < n; ++k) {
+    if (keys[k].between != Between::kCatmullRom) continue;
+    keys[k].between = Between::kBezier;
+    keys[k].out = slope[k];
+    if (k + 1 < n) keys[k + 1].in = slope[k + 1];
+  }
+  return keys;
+}
+
 TurnCurve::TurnCurve(std::vector<TurnKey> keys) : keys_(std::move(keys)) {
   check_times(keys_);
   for (TurnKey& key : keys_) {

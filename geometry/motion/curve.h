@@ -3,6 +3,7 @@
 #include <span>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "geometry/base/types.h"
@@ -61,6 +62,17 @@ class Curve {
 extern template class Curve<Real>;
 extern template class Curve<Vec2>;
 extern template class Curve<Vec3>;
+
+/// Area under the curve from one time to another [value s]; exact.
+Real integral(const Curve<Real>& curve, Real from, Real to);
+
+/// Least and largest value it ever has.
+std::pair<Real, Real> extremes(const Curve<Real>& curve);
+
+/// The keys whose `between` is kCatmullRom become kBezier with slopes that leave no value beyond those of the stretch's two keys: that of
+/// the parabola through a key and its neighbours, no steeper than three times either stretch, 0 at a peak; straight stretches stay.
+/// Source: Fritsch & Carlson 1980, SIAM J. Numer. Anal. 17, 238-246.
+std::vector<Key<Real>> without_overshoot(std::vector<Key<Real>> keys);
 
 /// Orientations by keys: kStep holds, everything else turns along the shorter arc.
 class TurnCurve {

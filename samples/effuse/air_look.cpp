@@ -76,7 +76,7 @@ void append_to_picture(geometry::TriMesh& all, const geometry::TriMesh& mesh) {
     kept.positions = from.positions;
     kept.triangles = from.triangles;
     kept.normals = from.normals;
-    for (const char* name : {"color", "water"}) {
+    for (const char* name : {"color", "glow", "water"}) {
       const auto found = from.attributes.find(name);
       if (found != from.attributes.end()) kept.attributes[name] = found->second;
     }
@@ -95,7 +95,7 @@ void append_to_picture(geometry::TriMesh& all, const geometry::TriMesh& mesh) {
     return;
   }
   all = only(all);
-  for (const auto& [name, width, value] : {std::tuple{"color", 3, kGrey}, std::tuple{"water", 1, 0.0f}}) {
+  for (const auto& [name, width, value] : {std::tuple{"color", 3, kGrey}, std::tuple{"glow", 3, 0.0f}, std::tuple{"water", 1, 0.0f}}) {
     if (!all.attributes.contains(name) && !more.attributes.contains(name)) continue;
     require(all, name, width, value);
     require(more, name, width, value);

@@ -102,7 +102,7 @@ FrameWriter::Result FrameWriter::write_frame(const flow::Simulation& simulation)
   for (const auto& effect : simulation.effects())
     for (flow::NamedMesh& own : effect->meshes()) {
       if (std::find(meshes_.begin(), meshes_.end(), own.name) == meshes_.end()) meshes_.push_back(own.name);
-      if (settings_.ply) skin::write_exact_ply(frames / numbered(own.name.c_str(), frame, "ply"), own.mesh, about);
+      if (settings_.ply) write_own(own, frame);
       if (preview_) append_to_picture(others, own.mesh);
     }
   skin::Air air;
@@ -130,6 +130,21 @@ FrameWriter::Result FrameWriter::write_frame(const flow::Simulation& simulation)
     skin::write_png(folder_ / "preview" / numbered("preview", frame, "png"), image);
   }
   return result;
+}
+
+void FrameWriter::write_own(const flow::NamedMesh& own, int frame) const {
+  const fs::path frames = folder_ / "frames";
+  const auto file = [&](int n) { return frames / numbered(own.name.c_str(), n, "ply"); };
+  // What has not changed is the file of the frame that showed it first, by another name: no bytes, no time.
+  int first = frame;
+  while (own.since >= 0 && first > 1 && scene_.frame_time(first - 1) >= own.since) --first;
+  if (first < frame && fs::exists(file(first))) {
+    std::error_code error;
+    fs::remove(file(frame), error);
+    fs::create_hard_link(file(first), file(frame), error);
+    if (!error) return;
+  }
+  skin::write_exact_ply(file(frame), own.mesh, metadata(first, scene_.frame_time(first)));
 }
 
 void FrameWriter::warn_of_lava_on(const Vec3& eye, const geometry::Points& points, Real spacing, int frame) {

@@ -46,6 +46,7 @@ class FrameWriter {
 
  private:
   skin::Metadata metadata(int frame, Real time) const;
+  void write_own(const flow::NamedMesh& own, int frame) const;
   /// Told once, on the first frame it happens in.
   void warn_of_lava_on(const Vec3& eye, const geometry::Points& points, Real spacing, int frame);
   bool told_of_camera_ = false;

@@ -23,7 +23,7 @@ namespace {
 /// Tables of a scene that may name files, each by its key `file`: things, and emitters within particles.
 std::vector<flow::Node*> tables_with_files(const std::string& name, flow::Node& table) {
   std::vector<flow::Node*> all;
-  const bool things = name == "obstacle" || name == "body" || name == "springs";
+  const bool things = name == "obstacle" || name == "body" || name == "springs" || name == "elastic" || name == "figure";
   for (flow::Node& one : table.items) {
     if (things) all.push_back(&one);
     if (name != "particles") continue;
@@ -48,7 +48,11 @@ std::string state_key(const flow::Node& resolved, const geometry::Terrain& terra
     for (flow::Node* one : tables_with_files(name, copy)) one->set("file", flow::Node{});
     hash.add(importers::to_toml(part));
   }
-  for (const flow::PlacedObstacle& each : solids.obstacles) hash.add(std::span<const Vec3>(each.shape.mesh().positions));
+  for (const flow::PlacedObstacle& each : solids.obstacles) {
+    hash.add(std::span<const Vec3>(each.shape.mesh().positions));
+    // Of a figure, its clip: of scenes' own obstacles the tables say it, too.
+    for (const geometry::PoseKey& key : each.track.keys()) hash.add(std::span<const Vec3>(&key.pose.position, 1));
+  }
   for (const flow::PlacedBody& each : solids.bodies) hash.add(std::span<const Vec3>(each.mesh.positions));
   hash.add(std::span<const Vec3>(terrain.mesh().positions));
   hash.add(terrain.georeference().origin.x());
@@ -103,6 +107,8 @@ std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const
     SolidThings& solids = loaded->solids;
     if (solids.obstacles.size() == scene.obstacles.size() && solids.bodies.size() == scene.bodies.size())
       solids.joints = load_joints(scene, solids.obstacles, solids.bodies, *loaded->terrain, faults, loaded->notes);
+    // Behind the scene's own obstacles, whose numbers joints have.
+    for (flow::PlacedObstacle& bone : load_figures(scene, {file.parent_path(), limits}, *loaded->terrain, faults, loaded->notes)) solids.obstacles.push_back(std::move(bone));
   }
   const auto world = [&] {
     return flow::World{&*loaded->terrain, scene.seed, &loaded->solids.obstacles, &loaded->solids.bodies, &loaded->solids.joints, scene.body_settings,

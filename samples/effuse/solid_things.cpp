@@ -8,6 +8,7 @@
 #include "geometry/base/error.h"
 #include "geometry/procedural/primitives.h"
 #include "geometry/repair/repair.h"
+#include "importers/clips/read_bvh.h"
 #include "importers/mesh/import_mesh.h"
 #include "samples/effuse/solid_look.h"
 
@@ -53,6 +54,21 @@ std::vector<flow::PlacedObstacle> load_obstacles(const flow::Scene& scene, const
       if (placed.size() > before) notes.push_back(fmt::format("obstacle '{}': {}", plan.name, geometry::to_string(placed.back().shape.report())));
     } catch (const InputError& error) {
       faults.insert(faults.end(), error.faults().begin(), error.faults().end());
+    }
+  }
+  return placed;
+}
+
+std::vector<flow::PlacedObstacle> load_figures(const flow::Scene& scene, const SceneFiles& files, const geometry::Terrain& terrain, std::vector<Fault>& faults,
+                                               std::vector<std::string>& notes) {
+  std::vector<flow::PlacedObstacle> placed;
+  for (const flow::PlannedFigure& plan : scene.figures) {
+    if (plan.file.empty() || plan.path.size() < 2) continue;
+    const std::filesystem::path path = std::filesystem::path(plan.file).is_relative() ? files.folder / plan.file : std::filesystem::path(plan.file);
+    try {
+      flow::place_figure(plan, importers::read_bvh(path, plan.scale), terrain, scene.frame_time(scene.frames), placed, faults, notes);
+    } catch (const InputError& error) {
+      for (const Fault& fault : error.faults()) faults.push_back({plan.file_place, to_string(fault)});
     }
   }
   return placed;
@@ -162,11 +178,12 @@ geometry::TriMesh in_one_picture(geometry::TriMesh lava, const geometry::TriMesh
   // Only what the picture is made of goes on.
   for (const char* name : {"piece", "inner"}) cold.attributes.erase(name);
   for (const auto& [name, attribute] : lava.attributes) {
-    if (name == "color" || name == "water") continue;
+    if (name == "color" || name == "water" || (name == "glow" && cold.attributes.contains("glow"))) continue;
     geometry::VertexAttribute& own = cold.attributes[name];
     own.width = attribute.width;
     own.values.assign(n * static_cast<std::size_t>(attribute.width), name == "temperature" ? kAir : name == "crust" ? 1 : 0.0f);
   }
+  if (cold.attributes.contains("glow") && !lava.attributes.contains("glow")) lava.attributes["glow"] = {3, std::vector<float>(3 * lava.positions.size(), 0.0f)};
   if (cold.attributes.contains("water")) lava.attributes["water"] = {1, std::vector<float>(lava.positions.size(), 0.0f)};
   if (lava.normals.empty()) cold.normals.clear();
   if (!lava.attributes.contains("color")) cold.attributes.erase("color");
@@ -181,7 +198,7 @@ void check_camera_among(const SolidThings& things, const skin::SkinSettings& set
     for (const flow::PlacedObstacle& each : things.obstacles) {
       const geometry::RigidPose pose = each.track.at(scene.frame_time(frame));
       if (!each.shape.inside(pose.body(eye))) continue;
-      throw InputError(settings.camera_place, fmt::format("preview: in frame {} the camera stands in obstacle '{}'; more elevation, another azimuth or distance would do", frame, each.name));
+      throw InputError(settings.camera.place, fmt::format("preview: in frame {} the camera stands in obstacle '{}'; more elevation, another azimuth or distance would do", frame, each.name));
     }
   }
 }

@@ -29,6 +29,10 @@ geometry::TriMesh load_form(const flow::PlannedForm& form, const SceneFiles& fil
 std::vector<flow::PlacedObstacle> load_obstacles(const flow::Scene& scene, const SceneFiles& files, const geometry::Terrain& terrain, std::vector<Fault>& faults,
                                                  std::vector<std::string>& notes);
 
+/// The same for its figures, whose bones are obstacles; to be put behind the scene's own.
+std::vector<flow::PlacedObstacle> load_figures(const flow::Scene& scene, const SceneFiles& files, const geometry::Terrain& terrain, std::vector<Fault>& faults,
+                                               std::vector<std::string>& notes);
+
 /// The same for its rigid bodies.
 std::vector<flow::PlacedBody> load_bodies(const flow::Scene& scene, const SceneFiles& files, const geometry::Terrain& terrain, std::vector<Fault>& faults,
                                           std::vector<std::string>& notes);
@@ -62,7 +66,7 @@ struct SolidThings {
 /// Throws InputError where the picture's camera stands in an obstacle at a frame of the film. Bodies, which move as they will, are not asked.
 void check_camera_among(const SolidThings& things, const skin::SkinSettings& settings, const geometry::Terrain& terrain, const flow::Scene& scene);
 
-/// Lava and obstacles for one picture: these cold and dull.
+/// Lava and other meshes for one picture: these cold and dull.
 geometry::TriMesh in_one_picture(geometry::TriMesh lava, const geometry::TriMesh& obstacles);
 
 }  // namespace effuse

@@ -11,71 +11,6 @@
 
 namespace effuse::skin {
 
-namespace {
-
-// Beyond, rays in single precision lose themselves; no map reaches as far.
-constexpr Real kNearest = 1e-3, kFarthest = 1e7, kMapEdge = 1e8;  // [m]
-
-bool off_the_map(const std::vector<Real>& at) { return std::max(std::abs(at[0]), std::abs(at[1])) > kMapEdge; }
-
-void read_camera(flow::Parameters& preview, SkinSettings& s) {
-  s.azimuth = preview.number("azimuth", "rad", -2.2, {}, "where the camera stands, counter-clockwise from east");
-  s.elevation = preview.number("elevation", "rad", 0.5, {-0.2, 1.5}, "of the camera above the horizon");
-  s.turn = preview.number("turn", "rad/s", 0, {}, "of the camera round its target, by seconds of film");
-  s.field_of_view = preview.number("fov", "rad", s.field_of_view, {0.02, 2.5}, "field of view from the picture's bottom to its top");
-  s.view = preview.numbers("view", "m", 3, false, "x, y in the terrain's map coordinates and radius of what the camera frames; absent: target, or all the terrain");
-  if (s.view.size() == 3) {
-    if (!(s.view[2] >= kNearest && s.view[2] <= kFarthest)) preview.fault("view", fmt::format("the radius, third number, is {}, must be from 0.001 to 1e7 m", s.view[2]));
-    if (off_the_map(s.view)) preview.fault("view", "lies more than 1e8 m from the origin of the map");
-  }
-  s.target = preview.numbers("target", "m", 0, false, "x, y in the terrain's map coordinates of what the camera looks at, on the ground, or x, y, z; goes with distance, not with view");
-  s.camera_place = preview.place("target");
-  // Nothing stands for it: a resolved scene has it with its target only.
-  if (preview.has("distance") || preview.has("target")) s.distance = preview.number("distance", "m", std::nullopt, {kNearest, kFarthest}, "of the camera from its target");
-  if (!preview.has("target")) {
-    if (preview.has("distance")) preview.fault("distance", "goes with target; with view the camera stands where it has all of that in the picture");
-    return;
-  }
-  if (preview.has("view")) preview.fault("target", "says what the camera looks at, and so does view: keep one of them");
-  if (s.target.size() != 2 && s.target.size() != 3) {
-    if (!s.target.empty()) preview.fault("target", fmt::format("has {} numbers, wanted [x, y] for a point of the ground, or [x, y, z]", s.target.size()));
-    s.target.clear();
-  } else if (off_the_map(s.target) || (s.target.size() == 3 && std::abs(s.target[2]) > kFarthest)) {
-    preview.fault("target", "lies more than 1e8 m from the origin of the map, or 1e7 m from sea level");
-  }
-}
-
-/// Where a camera with a target looks, in the terrain's local frame; nothing beside a terrain whose height it would have.
-std::optional<Vec3> target_of(const SkinSettings& s, const geometry::Terrain& terrain) {
-  const Vec3& origin = terrain.georeference().origin;
-  const Vec2 at = Vec2(s.target[0], s.target[1]) - origin.head<2>();
-  if (s.target.size() == 3) return Vec3(at.x(), at.y(), s.target[2] - origin.z());
-  const std::optional<Real> z = terrain.height(at.x(), at.y());
-  if (!z) return std::nullopt;
-  return Vec3(at.x(), at.y(), *z);
-}
-
-Camera camera_at(const SkinSettings& s, const geometry::Terrain& terrain, Real film_time) {
-  const Real azimuth = s.azimuth + film_time * s.turn;
-  if (!s.target.empty()) {
-    Camera camera;
-    camera.field_of_view = s.field_of_view;
-    camera.target = target_of(s, terrain).value_or(terrain.bounds().center());
-    camera.eye = camera.target + s.distance * Vec3(std::cos(azimuth) * std::cos(s.elevation), std::sin(azimuth) * std::cos(s.elevation), std::sin(s.elevation));
-    return camera;
-  }
-  Box3 box = terrain.bounds();
-  if (s.view.size() == 3) {
-    const Vec2 at = Vec2(s.view[0], s.view[1]) - terrain.georeference().origin.head<2>();
-    const Real z = terrain.height(at.x(), at.y()).value_or(box.center().z()), r = s.view[2];
-    // Flat: ground is wider than it is high.
-    box = Box3(Vec3(at.x() - r, at.y() - r, z - r / 4), Vec3(at.x() + r, at.y() + r, z + r / 4));
-  }
-  return frame_camera(box, azimuth, s.elevation, static_cast<Real>(s.picture.width) / s.picture.height, 0.02, s.field_of_view);
-}
-
-}  // namespace
-
 SkinSettings read_skin_settings(flow::Parameters& root) {
   using flow::Parameters;
   SkinSettings s;
@@ -151,37 +86,22 @@ SkinSettings read_skin_settings(flow::Parameters& root) {
   picture.width = static_cast<int>(preview.integer("width", picture.width, 16, 8192, "pixels"));
   picture.height = static_cast<int>(preview.integer("height", picture.height, 16, 8192, "pixels"));
   picture.samples = static_cast<int>(preview.integer("samples", picture.samples, 1, 256, "rays a pixel"));
-  picture.exposure = preview.number("exposure", "", picture.exposure, {0, 1e6, true}, "");
-  picture.sun = preview.number("sun", "", picture.sun, {0, 1e6}, "strength");
   picture.sky = preview.number("sky", "", picture.sky, {0, 1e6}, "strength");
-  const Vec3 sun = picture.sun_direction.normalized();
-  const Real sun_azimuth = preview.number("sun_azimuth", "rad", std::atan2(sun.y(), sun.x()), {}, "where the sun stands, counter-clockwise from east");
-  const Real sun_elevation = preview.number("sun_elevation", "rad", std::asin(sun.z()), {-1.5, 1.5}, "above the horizon: low is dusk, 0.6 is day");
-  picture.sun_direction = Vec3(std::cos(sun_azimuth) * std::cos(sun_elevation), std::sin(sun_azimuth) * std::cos(sun_elevation), std::sin(sun_elevation));
   picture.haze = preview.number("haze", "", picture.haze, {0, 1e6}, "");
   picture.glow_light = preview.number("glow_light", "", picture.glow_light, {0, 1e6}, "how much lava lights the ground");
-  read_camera(preview, s);
+  s.camera = read_scene_camera(preview, picture);
   return s;
 }
 
 PreviewOptions picture_at(const SkinSettings& s, const geometry::Terrain& terrain, Real film_time) {
   PreviewOptions picture = s.picture;
-  picture.camera = camera_at(s, terrain, film_time);
+  set_camera(picture, s.camera, terrain, film_time);
   picture.gloss = gloss_of(s.detail.kind);
   return picture;
 }
 
 void check_camera(const SkinSettings& s, const geometry::Terrain& terrain, int frames, Real fps) {
-  if (s.target.empty() || !s.preview) return;
-  if (!target_of(s, terrain)) throw InputError(s.camera_place, "preview.target: lies beside the terrain, which has no height there: give it a z, as [x, y, z]");
-  for (int frame = 1; frame <= frames; ++frame) {
-    const Camera camera = camera_at(s, terrain, frame / fps);
-    const Real over = terrain.signed_distance(camera.eye);
-    if (over >= 0) continue;
-    const Vec3 eye = camera.eye + terrain.georeference().origin;
-    throw InputError(s.camera_place, fmt::format("preview.target: in frame {} the camera stands at {:.1f}, {:.1f}, which is {:.1f} m in the ground; more elevation, another azimuth or distance, or a higher target would do", frame,
-                                                 eye.x(), eye.y(), -over));
-  }
+  if (s.preview) check_scene_camera(s.camera, terrain, frames, fps, static_cast<Real>(s.picture.width) / s.picture.height);
 }
 
 DisplaceOptions detail_at(const SkinSettings& s, const geometry::Terrain& terrain, Real film_time) {

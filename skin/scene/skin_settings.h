@@ -8,6 +8,7 @@
 #include "skin/color/lava_color.h"
 #include "skin/detail/displace.h"
 #include "skin/preview/preview.h"
+#include "skin/scene/scene_camera.h"
 #include "skin/surface/level_set.h"
 #include "skin/tessellate/make_skin.h"
 
@@ -35,14 +36,7 @@ struct SkinSettings {
 
   bool preview = true;
   PreviewOptions picture;
-  // The camera stands at azimuth and elevation from what it looks at: a circle of the map (`view`), a point (`target`), or the terrain.
-  Real azimuth = 0, elevation = 0;  ///< [rad]
-  Real turn = 0;                    ///< of the azimuth [rad] a second of film
-  Real field_of_view = 0.7;         ///< vertical [rad]
-  std::vector<Real> view;           ///< map x, y [m] of the middle and the radius; as far away as holds it. Empty: not
-  std::vector<Real> target;         ///< map x, y and, if not on the ground, z [m]; empty: not. At most one of view and target
-  Real distance = 0;                ///< of the camera from target [m], > 0 with one
-  Place camera_place;               ///< of target in the scene
+  SceneCamera camera;  ///< and sun
 };
 
 SkinSettings read_skin_settings(flow::Parameters& root);
@@ -56,9 +50,7 @@ SkinOptions skin_at(const SkinSettings& settings, const geometry::Terrain& terra
 /// The picture's options at a moment of the film [s].
 PreviewOptions picture_at(const SkinSettings& settings, const geometry::Terrain& terrain, Real film_time);
 
-/// Throws InputError at the scene's line when a camera with a target stands in the ground at a frame of the film, or its target lies
-/// beside the terrain and has no z.
-///   frames, fps  of the film
+/// check_scene_camera() of its camera, where there are pictures.
 void check_camera(const SkinSettings& settings, const geometry::Terrain& terrain, int frames, Real fps);
 
 }  // namespace effuse::skin

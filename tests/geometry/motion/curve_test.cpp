@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "geometry/base/error.h"
+#include "geometry/base/random.h"
 
 namespace effuse::geometry {
 namespace {
@@ -60,6 +61,40 @@ TEST(Curve, TurnsAlongTheShorterArcAtAConstantRate) {
   for (Real t = 0; t < 2; t += 0.25) EXPECT_LT(curve.at(t).angularDistance(about_z(0.6 * t)), 1e-9);
   EXPECT_LT(curve.at(2.9).angularDistance(about_z(1.2)), 1e-9);
   EXPECT_LT(curve.at(9).angularDistance(about_z(3)), 1e-9);
+}
+
+TEST(Curve, ItsIntegralAndExtremesAreThoseOfManySamples) {
+  const Curve<Real> curve({K{0, 1, Between::kCatmullRom, 0, 0}, K{1, 4, Between::kStep, 0, 0}, K{2, 0, Between::kLinear, 0, 0}, K{3, 2, Between::kBezier, 0, 9}, K{5, 2, Between::kBezier, 3, 0}});
+  for (const auto& [from, to] : {std::pair{-1.0, 7.0}, {0.3, 0.7}, {0.5, 4.1}, {2.5, 2.6}, {5.5, 9.0}, {-3.0, -1.0}}) {
+    const int n = 200000;
+    Real sum = 0;
+    for (int i = 0; i < n; ++i) sum += curve.at(from + (to - from) * (i + 0.5) / n) * (to - from) / n;
+    EXPECT_NEAR(integral(curve, from, to), sum, 2e-4) << from << " to " << to;  // a jump within a sample: 4 * 8 s / n
+    EXPECT_EQ(integral(curve, to, from), -integral(curve, from, to));
+  }
+  Real least = 1e9, most = -1e9;
+  for (Real t = -1; t < 6; t += 1e-4) least = std::min(least, curve.at(t)), most = std::max(most, curve.at(t));
+  EXPECT_NEAR(extremes(curve).first, least, 3e-4) << "samples 1e-4 s apart, slopes of 2 to 9";
+  EXPECT_NEAR(extremes(curve).second, most, 1e-6) << "flat there";
+  EXPECT_GE(extremes(curve).second, most);
+  EXPECT_GT(most, 4.2) << "the case has an extreme between keys";
+}
+
+TEST(Curve, SmoothWithoutOvershootNeverLeavesItsKeysValues) {
+  std::vector<Key<Real>> keys;
+  for (int k = 0; k < 40; ++k) keys.push_back({k + 0.9 * random_uniform(3, 1, k), k % 5 == 0 ? 0 : 5 * random_uniform(3, 2, k), Between::kCatmullRom, 0, 0});
+  const Curve<Real> loose(keys), tight(without_overshoot(keys));
+  EXPECT_LT(extremes(loose).first, -0.05) << "Catmull-Rom overshoots here";
+  for (std::size_t k = 0; k + 1 < keys.size(); ++k) {
+    const auto [low, high] = std::minmax(keys[k].value, keys[k + 1].value);
+    for (Real u = 0; u <= 1; u += 0.01) {
+      const Real v = tight.at(keys[k].time + u * (keys[k + 1].time - keys[k].time));
+      EXPECT_GE(v, low - 1e-12);
+      EXPECT_LE(v, high + 1e-12);
+    }
+    if (k == 0) continue;
+    EXPECT_NEAR(tight.slope(keys[k].time - 1e-9), tight.slope(keys[k].time), 1e-6) << "no kink";
+  }
 }
 
 TEST(Curve, RefusesKeysOutOfOrder) {

@@ -52,6 +52,42 @@ TEST(PreviewCamera, StandsAtItsDistanceFromATargetOnTheGroundInTheTermsOfTheMap)
   check_camera(s, terrain, 216, 24);
 }
 
+TEST(PreviewCamera, ItsNumbersAndTheSunsMayHaveKeysBySecondsOfFilm) {
+  const SkinSettings s = read("[preview]\ntarget = [2667450, 6478750]\ndistance = [[\"0 s\", \"20 m\"], [2, 40, \"hold\"], [3, 10]]\nfov = [[0, \"20 deg\"], [2, \"40 deg\"]]\nmotion = \"smooth\"\n"
+                              "sun_elevation = [[0, \"-10 deg\"], [4, \"30 deg\"]]\nexposure = [[0, 1, \"linear\"], [4, 2]]\n");
+  const geometry::Terrain terrain = ridge();
+  const auto at = [&](Real t) { return picture_at(s, terrain, t); };
+  const auto distance = [&](Real t) { return (at(t).camera.eye - at(t).camera.target).norm(); };
+  EXPECT_NEAR(distance(0), 20, 1e-9);
+  EXPECT_NEAR(distance(1), 30 + 2.5, 1e-9) << "leaves at 10 m/s, arrives at 0: 2 times (10 - 0) / 8 above the middle";
+  EXPECT_NEAR(distance(2.9), 40, 1e-9);
+  EXPECT_NEAR(distance(3), 10, 1e-9);
+  EXPECT_NEAR(at(1).camera.field_of_view, 30 * kDegree, 1e-12);
+  EXPECT_NEAR(std::asin(at(2).sun_direction.z()), 10 * kDegree, 1e-9);
+  EXPECT_NEAR(at(2).exposure, 1.5, 1e-12);
+}
+
+TEST(PreviewCamera, GoesFromKeyToKey) {
+  const std::string keys = "[preview]\nfov = 0.5\n[[preview.key]]\ntime = 0\nposition = [2667410, 6478750, 5]\ntarget = [2667450, 6478750, 2]\n[[preview.key]]\ntime = 2\nposition = [2667410, 6478790, 5]\n";
+  const SkinSettings s = read(keys);
+  const geometry::Terrain terrain = ridge();
+  const Camera from = picture_at(s, terrain, 0).camera, middle = picture_at(s, terrain, 1).camera, to = picture_at(s, terrain, 9).camera;
+  EXPECT_LT((from.eye - Vec3(10, 50, 7)).norm(), 1e-9) << from.eye.transpose();
+  EXPECT_LT((from.target - Vec3(50, 50, 12)).norm(), 1e-9);
+  EXPECT_LT((middle.eye - Vec3(10, 70, 7)).norm(), 1e-9);
+  EXPECT_LT((to.eye - Vec3(10, 90, 7)).norm(), 1e-9);
+  EXPECT_EQ(to.target, from.target) << "kept from the key before";
+  check_camera(s, terrain, 48, 24);
+  EXPECT_THROW(read(keys + "target = [0, 0, 0]\ntime = 3\nazimut = 3\n"), InputError);
+  EXPECT_THROW(read("[preview]\nazimuth = 1\n[[preview.key]]\ntime = 0\nposition = [0, 0, 5]\ntarget = [1, 0, 5]\n"), InputError) << "two ways to say where it stands";
+  EXPECT_THROW(read("[preview]\n[[preview.key]]\ntime = 0\nposition = [0, 0, 5]\n"), InputError) << "looks at nothing";
+  // Straight through the ridge; beside the terrain; at its own target.
+  const auto refused = [&](const std::string& more) { EXPECT_THROW(check_camera(read(keys + more), terrain, 96, 24), InputError) << more; };
+  refused("[[preview.key]]\ntime = 4\nposition = [2667450, 6478790, -3]\n");
+  refused("[[preview.key]]\ntime = 4\nposition = [2667950, 6478790, 3]\n");
+  refused("[[preview.key]]\ntime = 4\nposition = [2667450, 6478750, 2]\n");
+}
+
 TEST(PreviewCamera, ATargetWithAHeightIsThere) {
   const SkinSettings s = read("[preview]\ntarget = [2667450, 6478750, \"117 m\"]\ndistance = 5\nelevation = 0\nazimuth = 0");
   const Camera camera = picture_at(s, ridge(), 0).camera;
@@ -119,7 +155,7 @@ TEST(PreviewCamera, TheResolvedSceneReadsBackAsItself) {
     const SkinSettings s = read_skin_settings(second);
     EXPECT_NO_THROW(second.finish()) << resolved;
     EXPECT_EQ(importers::to_toml(second.resolved()), resolved);
-    EXPECT_EQ(s.target.size(), keys.find("km") != std::string::npos ? 3u : keys.find("target") != std::string::npos ? 2u : 0u);
+    EXPECT_EQ(s.camera.target.size(), keys.find("km") != std::string::npos ? 3u : keys.find("target") != std::string::npos ? 2u : 0u);
   }
 }
 

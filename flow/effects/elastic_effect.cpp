@@ -1,0 +1,279 @@
+#include "flow/effects/elastic_effect.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "flow/effects/elastic_shape.h"
+#include "flow/scene/placing.h"
+#include "geometry/base/error.h"
+#include "geometry/base/parallel.h"
+#include "geometry/base/zones.h"
+#include "geometry/collide/obstacles.h"
+#include "geometry/mesh/measure.h"
+
+namespace effuse::flow {
+
+namespace {
+
+using fem::ElasticSolid;
+
+constexpr Real kStep = 1. / 240;  // [s]: longer ones are stable, and dull
+constexpr int kHalvings = 8;      // of a step that went bad
+
+struct Pin {
+  Vec3 at;
+  Real radius;
+};
+
+/// The table, read.
+struct ElasticSettings {
+  PlannedForm form;
+  Real spacing = 0;
+  fem::ElasticMaterial material;
+  geometry::RigidPose pose;
+  bool on_ground = true;
+  Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero(), gravity = Vec3(0, 0, -kGravity);
+  std::vector<Pin> pins;
+  std::string pinned_to;
+  bool meets = true;
+  PenaltyResponse response;
+  Real thickness = 0, step = kStep;
+};
+
+class ElasticEffect final : public Effect {
+ public:
+  ElasticEffect(const ElasticSettings& settings, const World& world, ElasticShape shape)
+      : settings_(settings), terrain_(world.terrain), shape_(std::move(shape)), solid_(shape_.tets, shape_.material) {
+    if (world.obstacles)
+      for (const PlacedObstacle& each : *world.obstacles) {
+        if (each.name == settings.pinned_to) driver_ = each.track;
+        if (!settings.meets) continue;
+        obstacles_.add({each.shape, geometry::RigidMotion{each.track.at(0), each.track.at(0), 1}, each.temperature, static_cast<Index>(obstacles_.size() + 1)});
+        tracks_.push_back(each.track);
+      }
+    solid_.gravity = settings.gravity;
+    solid_.response = settings.response;
+    const Vec3 middle = settings.pose.position;
+    for (std::size_t i = 0; i < solid_.nodes(); ++i) {
+      solid_.state().v[i] = settings.velocity + settings.spin.cross(solid_.state().x[i] - middle);
+      for (const Pin& pin : settings.pins)
+        if ((solid_.state().x[i] - pin.at).norm() <= pin.radius) solid_.held()[i] = 1;
+      if (solid_.held()[i]) solid_.state().v[i] = Vec3::Zero();
+    }
+    start_ = solid_.state().x;
+    for (const Real m : solid_.mass()) mass_ += m;
+  }
+
+  std::string_view name() const override { return settings_.form.name; }
+  Real time() const override { return time_; }
+
+  void step(Real t_end) override {
+    ZONE("elastic.step");
+    const Real left = t_end - time_, count = std::max(1.0, std::ceil(left / settings_.step * (1 - 1e-9)));
+    Real dt = left / count;
+    const fem::SolidState before = solid_.state();
+    for (int halving = 0;; ++halving, dt /= 2) {
+      if (advance(dt)) break;
+      if (solid_.nodes() == before.x.size()) solid_.state() = before;
+      if (halving == kHalvings || solid_.nodes() != before.x.size())
+        throw UnstableError(fmt::format("elastic '{}' at {:.6g} s: the solve of a step does not end in numbers, even with steps of {:.3g} s; a shorter step, or a smaller contact_stiffness, would do", name(), time_, dt));
+      ++retries_;
+    }
+    time_ = count > 1 || dt < left ? time_ + dt : t_end;
+    ++steps_;
+  }
+
+  std::vector<NamedMesh> meshes() const override {
+    std::vector<NamedMesh> all;
+    all.push_back({settings_.form.name, shape_.look(solid_, settings_.form.color)});
+    return all;
+  }
+
+  std::size_t memory() const override { return solid_.memory() + shape_.memory() + 4 * solid_.nodes() * sizeof(Vec3); }
+  void add_to(StateHash& hash) const override {
+    hash.add(time_);
+    solid_.add_to(hash);
+  }
+  void save(StateWriter& out) const override {
+    out.value("time", time_);
+    out.value("steps", steps_);
+    out.value("retries", retries_);
+    out.value("split", split_);
+    out.value("unsolved", unsolved_);
+    solid_.save(out);
+  }
+  void load(StateReader& in) override {
+    in.value("time", time_);
+    in.value("steps", steps_);
+    in.value("retries", retries_);
+    in.value("split", split_);
+    in.value("unsolved", unsolved_);
+    solid_.load_state(in);
+  }
+  std::vector<std::pair<std::string, double>> figures() const override {
+    Real kinetic = 0;
+    for (std::size_t i = 0; i < solid_.nodes(); ++i) kinetic += solid_.mass()[i] * solid_.state().v[i].squaredNorm() / 2;
+    return {{"nodes", static_cast<double>(solid_.nodes())},
+            {"tetrahedra", static_cast<double>(solid_.tets().size())},
+            {"mass_kg", mass_},
+            {"pieces", static_cast<double>(pieces_of(solid_))},
+            {"nodes_split", static_cast<double>(split_)},
+            {"volume_change", solid_.volume() / solid_.rest_volume() - 1},
+            {"steps", static_cast<double>(steps_)},
+            {"retries", static_cast<double>(retries_)},
+            {"unsolved_steps", static_cast<double>(unsolved_)},
+            {"kinetic_energy_j", kinetic},
+            {"elastic_energy_j", solid_.elastic_energy(solid_.state().x)}};
+  }
+  std::string status() const override {
+    return fmt::format("{} tetrahedra{}, dt {:.3g} s", solid_.tets().size(), split_ > 0 ? fmt::format(" in {} pieces", pieces_of(solid_)) : "", settings_.step);
+  }
+
+ private:
+  bool advance(Real dt) {
+    std::vector<Vec3>& v = solid_.state().v;
+    const std::vector<Vec3>& x = solid_.state().x;
+    if (driver_) {
+      // Held points go where the obstacle carries them, straight within a step.
+      const geometry::RigidPose home = driver_->at(0), to = driver_->at(time_ + dt);
+      for (std::size_t i = 0; i < start_.size(); ++i)
+        if (solid_.held()[i]) v[i] = (to.world(home.orientation.conjugate() * (start_[i] - home.position)) - x[i]) / dt;
+    }
+    if (settings_.meets) find_contacts(dt);
+    const fem::StepReport report = solid_.step(dt);
+    split_ += report.split;
+    unsolved_ += report.converged ? 0 : 1;
+    return parallel_reduce(
+        solid_.nodes(), true, [&](std::size_t i) { return x[i].allFinite() && v[i].allFinite(); }, [](bool a, bool b) { return a && b; });
+  }
+
+  /// Planes of all that a point can reach in the step.
+  void find_contacts(Real dt) {
+    std::vector<PlaneContact>& contacts = solid_.contacts;
+    const std::vector<Vec3>& x = solid_.state().x;
+    contacts.clear();
+    const Real fastest = parallel_max(x.size(), 0.0, [&](std::size_t i) { return solid_.state().v[i].norm(); });
+    const Real reach = settings_.thickness + 2 * (fastest + settings_.gravity.norm() * dt) * dt + shape_.spacing / 2;
+    const auto take = [&](std::size_t i, const geometry::Contact& c) {
+      contacts.push_back({static_cast<Index>(i), Vec3(x[i] + (settings_.thickness - c.distance) * c.normal), c.normal, c.surface_velocity});
+    };
+    if (terrain_) {
+      found_.resize(x.size());
+      terrain_->contacts(x, reach, found_);
+      for (std::size_t i = 0; i < found_.size(); ++i)
+        if (found_[i].any()) take(i, found_[i]);
+    }
+    if (tracks_.empty()) return;
+    for (std::size_t k = 0; k < tracks_.size(); ++k) obstacles_.move(k, {tracks_[k].at(time_), tracks_[k].at(time_ + dt), dt});
+    obstacles_.update();
+    constexpr int kPerPoint = 3;
+    found_.resize(kPerPoint * x.size());
+    obstacles_.contacts(x, reach, kPerPoint, found_);
+    for (std::size_t q = 0; q < found_.size(); ++q)
+      if (found_[q].any()) take(q / kPerPoint, found_[q]);
+  }
+
+  ElasticSettings settings_;
+  const geometry::Terrain* terrain_;
+  ElasticShape shape_;
+  ElasticSolid solid_;
+  std::vector<Vec3> start_;
+  geometry::Obstacles obstacles_;
+  std::vector<geometry::PoseTrack> tracks_;
+  std::optional<geometry::PoseTrack> driver_;
+  std::vector<geometry::Contact> found_;
+  Real time_ = 0, mass_ = 0;
+  std::uint64_t steps_ = 0, retries_ = 0, split_ = 0, unsolved_ = 0;
+};
+
+Vec3 vector(Parameters& p, const char* key, const char* unit, const Vec3& usual, const char* what) {
+  const std::vector<Real> v = p.numbers(key, unit, 3, false, what);
+  return v.size() == 3 ? Vec3(v[0], v[1], v[2]) : usual;
+}
+
+ElasticSettings read(Parameters& p) {
+  ElasticSettings s;
+  read_form(p, "closed mesh, relative to the scene file", s.form);
+  const std::string& name = s.form.name;
+  if (name.empty() || name.find_first_of("/\\\n") != std::string::npos) p.fault("name", fmt::format("'{}' cannot be part of a file's name", name));
+  s.spacing = p.number("spacing", "m", std::nullopt, Parameters::positive(), "of its tetrahedra: the resolution");
+  fem::ElasticMaterial& m = s.material;
+  m.youngs_modulus = p.number("youngs_modulus", "Pa", std::nullopt, Parameters::positive(), "stiffness: jelly 10 kPa, rubber 5 MPa, wood 10 GPa, concrete 30 GPa");
+  m.poisson_ratio = p.number("poisson_ratio", "", 0.3, {-0.9, 0.49}, "how much it bulges where it is pressed: cork 0, most 0.3, rubber 0.49 (linear elements stiffen towards 0.5)");
+  m.density = p.number("density", "kg/m3", std::nullopt, Parameters::positive(), "");
+  m.damping = p.number("damping", "s", 0.002, Parameters::not_negative(), "of its oscillations: an angular frequency w loses the share w damping of its amplitude in a radian, halved");
+  m.strength = p.number("strength", "Pa", 0, Parameters::not_negative(), "tension at which it breaks; 0: never");
+  s.pose = read_pose(p, false, {});
+  s.on_ground = p.flag("on_ground", false, "its height counts from the terrain at x, y");
+  s.velocity = vector(p, "velocity", "m/s", s.velocity, "at the start");
+  s.spin = vector(p, "spin", "rad/s", s.spin, "at the start, about its position");
+  for (const std::vector<Real>& pin : p.number_lists("pins", "m", 4, false, "[x, y, z, radius]: points that start this near are held")) s.pins.push_back({Vec3(pin[0], pin[1], pin[2]), pin[3]});
+  s.pinned_to = p.text("pinned_to", "", "obstacle that carries the held points");
+  s.gravity = vector(p, "gravity", "m/s2", s.gravity, "");
+  s.meets = p.flag("meets_ground", true, "and obstacles");
+  const Real stiffness = 10 * m.youngs_modulus * s.spacing, mass = m.density * std::pow(s.spacing, 3) / 4;
+  s.response.stiffness = p.number("contact_stiffness", "N/m", stiffness, Parameters::not_negative(), "of ground and obstacles, on each node; absent: ten times youngs_modulus times spacing");
+  s.response.damping = p.number("contact_damping", "N s/m", 0.4 * std::sqrt(std::max(0.0, s.response.stiffness) * mass), Parameters::not_negative(), "of the same; absent: a fifth of what stops a node");
+  s.response.friction = p.number("friction", "", 0.5, Parameters::not_negative(), "Coulomb's number of ground and obstacles");
+  s.thickness = p.number("thickness", "m", 0, Parameters::not_negative(), "that it keeps from ground and obstacles");
+  s.step = p.number("step", "s", s.step, {1e-7, 1}, "of the implicit solve: any is stable, long ones are dull");
+  return s;
+}
+
+/// The shape of a table where it starts, or faults: what does not fit.
+std::optional<ElasticShape> make_shape(const ElasticSettings& s, const World& world, std::vector<Fault>& faults) {
+  const Place place = s.form.place;
+  const std::string what = fmt::format("elastic '{}'", s.form.name);
+  try {
+    geometry::RigidPose pose = s.pose;
+    if (s.on_ground && (!world.terrain || !put_on_terrain(pose, true, *world.terrain, what, place, faults))) return std::nullopt;
+    if (!s.pinned_to.empty()) {
+      std::vector<std::string> names;
+      if (world.obstacles)
+        for (const PlacedObstacle& each : *world.obstacles) names.push_back(each.name);
+      if (std::find(names.begin(), names.end(), s.pinned_to) == names.end()) {
+        const std::string near = nearest_name(s.pinned_to, names);
+        throw InputError(place, fmt::format("{}: pinned_to names '{}', no obstacle of the scene{}", what, s.pinned_to, near.empty() ? "" : fmt::format(" (did you mean {}?)", near)));
+      }
+    }
+    if (s.form.box.minCoeff() > 0) return box_shape(s.form.box, s.spacing, s.material, pose, what);
+    const geometry::TriMesh mesh = s.form.file.empty() ? mesh_of(s.form) : upright(world.mesh(s.form), s.form.scale, s.form.y_up);
+    return mesh_shape(mesh, s.spacing, s.material, pose, what);
+  } catch (const InputError& error) {
+    for (const Fault& fault : error.faults()) faults.push_back(fault.place.line > 0 ? fault : Fault{place, fault.message});
+    return std::nullopt;
+  }
+}
+
+}  // namespace
+
+EffectPlan read_elastic(Parameters& parameters, Real duration) {
+  ElasticSettings settings = read(parameters);
+  settings.form.place = parameters.place("");
+  EffectPlan plan;
+  plan.name = settings.form.name;
+  // A file's size nobody knows yet: as a thousand cubes of the lattice.
+  const Real volume = settings.form.ball > 0 ? 4.19 * std::pow(settings.form.ball, 3) : settings.form.box.prod();
+  const Real cubes = volume > 0 && settings.spacing > 0 ? volume / std::pow(settings.spacing, 3) : 1000;
+  const Real tets = cubes * (settings.form.box.minCoeff() > 0 ? 5 : 12);
+  plan.estimate.bytes = 3000 * tets;
+  plan.estimate.steps = std::ceil(duration / settings.step);
+  plan.estimate.seconds = plan.estimate.steps * tets * 1e-5;
+  plan.misfits = [settings](const World& world) {
+    std::vector<Fault> faults;
+    make_shape(settings, world, faults);
+    return faults;
+  };
+  plan.build = [settings](const World& world) -> std::unique_ptr<Effect> {
+    std::vector<Fault> faults;
+    std::optional<ElasticShape> shape = make_shape(settings, world, faults);
+    if (!shape) throw InputError(faults);
+    return std::make_unique<ElasticEffect>(settings, world, std::move(*shape));
+  };
+  return plan;
+}
+
+}  // namespace effuse::flow
