@@ -67,6 +67,7 @@ SolidWorld::SolidWorld(const std::vector<PlacedObstacle>& obstacles, const std::
     : friction_(1, 1.0), effusivity_(1, 0.0) {
   for (const PlacedObstacle& each : obstacles) {
     names_.push_back(fmt::format("obstacle '{}'", each.name));
+    if (each.track.keys().size() > 1) moving_.push_back(static_cast<Index>(tracks_.size()));
     tracks_.push_back(each.track);
     friction_.push_back(each.friction);
     obstacles_.add({each.shape, RigidMotion(each.track.at(0)), each.temperature, static_cast<Index>(tracks_.size())});
@@ -142,7 +143,7 @@ void SolidWorld::go(std::size_t i, const RigidMotion& motion) {
 
 void SolidWorld::stand(Real time, Real dt) {
   time_ = time;
-  for (std::size_t i = 0; i < tracks_.size(); ++i) go(i, tracks_[i].between(time, time + dt).turned_back());
+  for (const Index i : moving_) go(i, tracks_[i].between(time, time + dt).turned_back());
   for (std::size_t b = 0; b < ids_.size(); ++b) {
     if (gone(b)) continue;
     const RigidPose now = bodies_->body_pose(ids_[b]);
@@ -155,7 +156,7 @@ void SolidWorld::stand(Real time, Real dt) {
 }
 
 void SolidWorld::move(Real from, Real to) {
-  for (std::size_t i = 0; i < tracks_.size(); ++i) go(i, tracks_[i].between(from, to));
+  for (const Index i : moving_) go(i, tracks_[i].between(from, to));
   for (std::size_t b = 0; b < ids_.size(); ++b)
     if (!gone(b)) go(tracks_.size() + b, RigidMotion(before_[b], bodies_->body_pose(ids_[b]), last_dt_));
   obstacles_.update();
@@ -208,8 +209,7 @@ void SolidWorld::take(std::span<const Movable> movable, Real dt) {
 
 /// Bodies and driven obstacles from time_ on.
 void SolidWorld::step_bodies(Real dt) {
-  for (std::size_t i = 0; i < tracks_.size(); ++i)
-    if (tracks_[i].keys().size() > 1) bodies_->move_to(driven_[i], tracks_[i].at(time_ + dt));
+  for (const Index i : moving_) bodies_->move_to(driven_[i], tracks_[i].at(time_ + dt));
   if (brittle_) {
     const bodies::BrittleReport report = brittle_->step(dt);
     last_ = report.bodies;
@@ -269,9 +269,7 @@ sph::SolidOptions SolidWorld::solids() {
   if (has_bodies()) options.friction_by = [this](Index surface) { return surface < friction_.size() ? friction_[surface] : 1; };
   options.effusivity = effusivity_;
   options.heated = [this](std::span<const Real> heat, std::span<const Real> hottest) { warm(heat, hottest); };
-  bool moves = has_bodies();
-  for (const geometry::PoseTrack& track : tracks_) moves = moves || track.keys().size() > 1;
-  if (moves) {
+  if (has_bodies() || !moving_.empty()) {
     options.stand = [this](Real time, Real dt) { stand(time, dt); };
     options.move = [this](Real from, Real to) { move(from, to); };
   }

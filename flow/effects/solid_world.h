@@ -120,6 +120,7 @@ class SolidWorld {
 
   std::vector<std::string> names_;       // obstacles', then bodies'
   std::vector<geometry::PoseTrack> tracks_;
+  std::vector<Index> moving_;            // obstacles whose tracks have several keys
   std::vector<bodies::BodyId> driven_;   // of each obstacle; only where there are bodies
   std::vector<bodies::BodyId> ids_;      // of bodies, then pieces
   std::size_t of_scene_ = 0;             // bodies of the scene among them

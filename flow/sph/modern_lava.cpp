@@ -608,10 +608,11 @@ struct ModernLava::Impl {
     solids.go(time, dt);
     if (!o.guards.projection) return;
     std::vector<Index> which;
+    which.reserve(set.awake);
     for (std::size_t k = 0; k < set.awake; ++k)
       if (!emitter.held(set.particles[k])) which.push_back(set.particles[k]);
-    std::vector<Vec3> wanted = x;
-    report.solids = solids.slide(which, from, x, v);
+    std::vector<Vec3> wanted;
+    report.solids = solids.slide(which, from, x, v, &wanted);
     if (report.solids.near == 0) return;
     ground.moved(wanted, x);
     // Obstacles have the last word: what they keep in the ground waits for the next step.

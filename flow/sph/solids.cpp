@@ -29,14 +29,22 @@ constexpr std::size_t kFew = 16;    // obstacles near a block that each of its p
 /// whose block meets more than kFew).
 template <class BoxOf, class Place>
 void find_near(const geometry::Obstacles& obstacles, std::size_t count, Real by, BoxOf&& box, Place&& place, std::vector<std::uint8_t>& flags, std::vector<Index>& near) {
-  flags.assign(count, 0);
-  const Box3 everything = widened(obstacles.swept_bounds(), by);
+  near.clear();
+  std::vector<Box3> blocks((count + kBlock - 1) / kBlock);
   parallel_ranges(count, kBlock, [&](std::size_t begin, std::size_t end) {
-    Box3 block;
-    for (std::size_t k = begin; k < end; ++k) block.extend(box(k));
-    if (!block.intersects(everything)) return;
+    for (std::size_t k = begin; k < end; ++k) blocks[begin / kBlock].extend(box(k));
+  });
+  // All of them first: one question, where every obstacle is far.
+  Box3 all;
+  for (const Box3& block : blocks) all.extend(block);
+  if (!all.intersects(widened(obstacles.swept_bounds(), by))) return;
+  std::vector<Index> any;
+  obstacles.meeting(widened(all, by), any);
+  if (any.empty()) return;
+  flags.assign(count, 0);
+  parallel_ranges(count, kBlock, [&](std::size_t begin, std::size_t end) {
     std::vector<Index> meeting;
-    obstacles.meeting(widened(block, by), meeting);
+    obstacles.meeting(widened(blocks[begin / kBlock], by), meeting);
     if (meeting.empty()) return;
     std::array<Box3, kFew> boxes;
     if (meeting.size() <= kFew)
@@ -44,7 +52,6 @@ void find_near(const geometry::Obstacles& obstacles, std::size_t count, Real by,
     for (std::size_t k = begin; k < end; ++k)
       flags[k] = meeting.size() > kFew || std::any_of(boxes.begin(), boxes.begin() + static_cast<std::ptrdiff_t>(meeting.size()), [&](const Box3& b) { return b.intersects(box(k)); });
   });
-  near.clear();
   for (std::size_t k = 0; k < count; ++k)
     if (flags[k]) near.push_back(static_cast<Index>(k));
 }
@@ -220,12 +227,14 @@ bool Solids::disturbs(const Vec3& x, Real reach, Real speed) const {
   return std::any_of(found.begin(), found.begin() + n, [&](const Contact& c) { return c.surface_velocity.norm() > speed; });
 }
 
-geometry::SlideReport Solids::slide(std::span<const Index> which, std::span<const Vec3> before, std::span<Vec3> x, std::span<Vec3> v) {
+geometry::SlideReport Solids::slide(std::span<const Index> which, std::span<const Vec3> before, std::span<Vec3> x, std::span<Vec3> v,
+                                    std::vector<Vec3>* wanted) {
   ZONE("sph.solids");
   if (!any()) return {};
   find_near(*options_.obstacles, which.size(), 2 * radius_, [&](std::size_t k) { return Box3(before[which[k]].cwiseMin(x[which[k]]), before[which[k]].cwiseMax(x[which[k]])); },
             [](const geometry::Obstacle& o) { return o.motion.swept_box(o.shape.bounds()); }, flags_, near_);
   if (near_.empty()) return {};
+  if (wanted) wanted->assign(x.begin(), x.end());
   for (Index& k : near_) k = which[k];
   const std::size_t n = near_.size();
   for (auto* array : {&at_, &way_, &speed_at_}) array->resize(n);

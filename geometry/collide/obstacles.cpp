@@ -106,44 +106,22 @@ int Obstacles::contacts(const Vec3& point, Real reach, std::span<Contact> out) c
   // One box test, where nothing is near; false for NaN too.
   if (out.empty() || !(impl_->now.squaredExteriorDistance(point) <= reach * reach)) return 0;
 
-  // The best so far, with the obstacles' numbers: by distance, surface, number.
-  constexpr std::size_t kMost = 16;
-  CHECK_LE(out.size(), kMost);
-  std::array<Index, kMost> number{};
-  std::size_t count = 0;
+  CHECK_LE(out.size(), NearestContacts::kMost);
+  NearestContacts nearest(out);
   impl_->tree.nearest(point, reach * reach, [&](Index i, Real& limit2) {
     const Obstacle& obstacle = *impl_->all[i];
     const Real gap2 = impl_->place[i].now.squaredExteriorDistance(point);
     if (gap2 > limit2) return;
-    const RigidPose& pose = obstacle.motion.to();
     // In its box the point may be in itself, deeper than any other is away.
-    const auto nearest = obstacle.shape.nearest(pose.body(point), gap2 > 0 ? std::min(reach, std::sqrt(limit2) * (1 + 1e-12)) : reach);
-    if (!nearest) return;
-    const auto before = [&](std::size_t k) {
-      if (nearest->distance != out[k].distance) return nearest->distance < out[k].distance;
-      return obstacle.surface != out[k].surface ? obstacle.surface < out[k].surface : i < number[k];
-    };
-    std::size_t slot = std::min(count, out.size() - 1);
-    if (count == out.size() && !before(slot)) return;
-    count = std::min(count + 1, out.size());
-    for (; slot > 0 && before(slot - 1); --slot) {
-      out[slot] = out[slot - 1];
-      number[slot] = number[slot - 1];
-    }
-    number[slot] = i;
-    Contact& contact = out[slot];
-    contact.point = pose.world(nearest->point);
-    contact.normal = pose.orientation * nearest->normal;
-    contact.distance = nearest->distance;
-    contact.surface_velocity = obstacle.motion.velocity_at(contact.point, 1);
-    contact.surface_temperature = obstacle.temperature;
-    contact.surface = obstacle.surface;
-    if (count == out.size()) {
-      const Real furthest = std::max(Real{0}, out[count - 1].distance);
+    const auto found = obstacle.shape.nearest(obstacle.motion.to().body(point), gap2 > 0 ? std::min(reach, std::sqrt(limit2) * (1 + 1e-12)) : reach);
+    if (!found) return;
+    nearest.add(*found, obstacle, i);
+    if (nearest.full()) {
+      const Real furthest = std::max(Real{0}, out.back().distance);
       limit2 = std::min(limit2, furthest * furthest);
     }
   });
-  return static_cast<int>(count);
+  return static_cast<int>(nearest.count());
 }
 
 void Obstacles::contacts(std::span<const Vec3> points, Real reach, int per_point, std::span<Contact> out) const {

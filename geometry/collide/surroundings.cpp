@@ -16,7 +16,7 @@ using Feature = TrianglePoint::Feature;
 
 namespace {
 constexpr Real kFlat = 1e-3;    // [rad]: an edge this flat is no edge
-constexpr std::size_t kMost = 16;
+constexpr std::size_t kMost = NearestContacts::kMost;
 }  // namespace
 
 void Impl::find_hollows() {
@@ -116,35 +116,12 @@ void Obstacles::surroundings(std::span<const Vec3> points, Real reach, int per_p
     const Vec3& point = points[i];
     if (!(impl_->now.squaredExteriorDistance(point) <= reach * reach)) return;
     std::array<CollisionMesh::Nearest, kMost> around;
-    std::array<Index, kMost> number{};
-    std::size_t count = 0;
+    NearestContacts nearest(own);
     impl_->tree.nearest(point, reach * reach, [&](Index which, Real& limit2) {
       if (impl_->place[which].now.squaredExteriorDistance(point) > limit2) return;
       const Obstacle& obstacle = *impl_->all[which];
-      const RigidPose& pose = obstacle.motion.to();
-      const std::size_t found = obstacle.shape.surroundings(pose.body(point), reach, std::span(around).first(each));
-      for (std::size_t k = 0; k < found; ++k) {
-        const CollisionMesh::Nearest& next = around[k];
-        const auto before = [&](std::size_t s) {
-          if (next.distance != own[s].distance) return next.distance < own[s].distance;
-          return obstacle.surface != own[s].surface ? obstacle.surface < own[s].surface : which < number[s];
-        };
-        std::size_t slot = std::min(count, each - 1);
-        if (count == each && !before(slot)) continue;
-        count = std::min(count + 1, each);
-        for (; slot > 0 && before(slot - 1); --slot) {
-          own[slot] = own[slot - 1];
-          number[slot] = number[slot - 1];
-        }
-        number[slot] = which;
-        Contact& contact = own[slot];
-        contact.point = pose.world(next.point);
-        contact.normal = pose.orientation * next.normal;
-        contact.distance = next.distance;
-        contact.surface_velocity = obstacle.motion.velocity_at(contact.point, 1);
-        contact.surface_temperature = obstacle.temperature;
-        contact.surface = obstacle.surface;
-      }
+      const std::size_t found = obstacle.shape.surroundings(obstacle.motion.to().body(point), reach, std::span(around).first(each));
+      for (std::size_t k = 0; k < found; ++k) nearest.add(around[k], obstacle, which);
     });
   }, 512);
 }

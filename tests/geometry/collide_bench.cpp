@@ -84,6 +84,43 @@ void obstacle_contacts(benchmark::State& state) {
 BENCHMARK(obstacle_contacts)->Args({1000, 1})->Args({10000, 1})->Args({100000, 1})->Args({1000000, 1})->Args({1000, 100})->Args({1000, 10000})
     ->Args({100000, 100})->Args({100000, 10000})->Unit(benchmark::kMillisecond);
 
+/// Up to four a point, of one room seen from within beside its corners: what surroundings() costs over contacts(), that finds its nearest
+/// face alone. Argument: 0 contacts, 1 surroundings.
+void corner_contacts(benchmark::State& state) {
+  const ThreadLimit one(1);
+  TriMesh m = make_box(Vec3::Zero(), Vec3(8, 8, 8));
+  std::erase_if(m.triangles, [&](const Triangle& t) { return std::all_of(t.begin(), t.end(), [&](Index v) { return m.positions[v].z() > 0; }); });
+  Obstacles obstacles;
+  obstacles.add({CollisionMesh(m), {}, 0, 1});
+  obstacles.update();
+  std::vector<Vec3> points(100000);
+  for (std::size_t k = 0; k < points.size(); ++k) points[k] = 2 * Vec3(random_uniform(2, 0, k), random_uniform(2, 1, k), random_uniform(2, 2, k));
+  std::vector<Contact> contacts(4 * points.size());
+  for (auto _ : state) {
+    if (state.range(0) == 0) obstacles.contacts(points, 1, 4, contacts);
+    else obstacles.surroundings(points, 1, 4, contacts);
+    benchmark::ClobberMemory();
+  }
+  state.SetItemsProcessed(static_cast<std::int64_t>(state.iterations() * points.size()));
+  state.SetLabel(hash_of(contacts));
+}
+BENCHMARK(corner_contacts)->ArgName("surroundings")->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
+
+/// What surroundings() costs over contacts() on the torus, where each point has one. Argument: triangles.
+void obstacle_surroundings(benchmark::State& state) {
+  const ThreadLimit one(1);
+  const std::vector<Vec3> points = points_about(1, 100000);
+  const Obstacles obstacles = square(state.range(0), 1, Vec3::Zero(), false);
+  std::vector<Contact> contacts(points.size());
+  for (auto _ : state) {
+    obstacles.surroundings(points, kReach, 1, contacts);
+    benchmark::ClobberMemory();
+  }
+  state.SetItemsProcessed(static_cast<std::int64_t>(state.iterations() * points.size()));
+  state.SetLabel(hash_of(contacts));
+}
+BENCHMARK(obstacle_surroundings)->Arg(1000)->Arg(100000)->Unit(benchmark::kMillisecond);
+
 /// The same points, with all obstacles a kilometre away: what a scene pays for them.
 void far_obstacle_contacts(benchmark::State& state) {
   const ThreadLimit one(1);

@@ -1,0 +1,106 @@
+#include "flow/effects/solid_world.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <iostream>
+
+#include "flow/sph/modern_lava.h"
+#include "geometry/base/hash.h"
+#include "geometry/base/parallel.h"
+#include "geometry/procedural/primitives.h"
+#include "tests/flow/sph/sample_system.h"
+
+/// What things that lava does not reach cost it.
+namespace effuse::flow {
+namespace {
+
+using geometry::CollisionMesh;
+using geometry::PoseKey;
+using geometry::PoseTrack;
+using sph::ModernLava;
+
+constexpr Real kSpacing = 0.5;
+
+sph::ModernOptions options() {
+  sph::ModernOptions o;
+  o.spacing = kSpacing;
+  o.rheology = sph::Rheology::newtonian(2000);
+  o.heat.on = false;
+  o.ground_speed = 0;
+  o.gravity = kGravity * Vec3(0.2, 0, -0.98);
+  return o;
+}
+
+const sph::ContactSource kPlane = [](std::span<const Vec3> x, Real reach, std::span<geometry::Contact> out) {
+  for (std::size_t i = 0; i < x.size(); ++i)
+    out[i] = x[i].z() < reach ? geometry::Contact{Vec3(x[i].x(), x[i].y(), 0), Vec3::UnitZ(), x[i].z(), Vec3::Zero(), 0, 0} : geometry::Contact{};
+};
+
+void fill(ModernLava& lava, int side) {
+  const std::vector<Vec3> x = sph::lattice_block(side, side, 6, kSpacing);
+  lava.add(x, std::vector<Vec3>(x.size(), Vec3::Zero()), std::vector<Real>(x.size(), 1400));
+}
+
+/// Boulders in rings around lava that begins at (0, 0, 0), so that the box around all of them holds it.
+std::vector<PlacedObstacle> around(int count) {
+  const CollisionMesh boulder(geometry::make_sphere(Vec3::Zero(), 1, 1));
+  std::vector<PlacedObstacle> all;
+  for (int k = 0; k < count; ++k) {
+    const Real angle = 2.4 * k, far = 50 + 2 * std::sqrt(static_cast<Real>(k));
+    PoseKey key;
+    key.pose.position = Vec3(10 + far * std::cos(angle), 10 + far * std::sin(angle), 0);
+    all.push_back({"boulder", boulder, PoseTrack(std::vector<PoseKey>{key}), 0, 1});
+  }
+  return all;
+}
+
+double thread_seconds() {
+  timespec t{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+double median(std::vector<double> values) {
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
+  return values[values.size() / 2];
+}
+
+std::string hash_of(const ModernLava& lava) {
+  StateHash hash;
+  lava.add_to(hash);
+  return hash.hex();
+}
+
+// Processor time of steps with and without them, by turns: what else the machine does meets both.
+TEST(SolidWorldCostSlow, ObstaclesFarFromTheLavaCostLessThanAHundredthMore) {
+  const ThreadLimit limit(1);
+  for (const int count : {1, 100, 1000}) {
+    SolidWorld world(around(count), {}, nullptr);
+    ModernLava without(options(), {}, {kPlane}), with(options(), {}, {kPlane}, {}, world.solids());
+    fill(without, 32);
+    fill(with, 32);
+    std::vector<double> plain, extra;
+    const auto timed = [](ModernLava& lava) {
+      const double before = thread_seconds();
+      lava.step(0.02);
+      return thread_seconds() - before;
+    };
+    for (int k = 0; k < 100; ++k) {
+      const bool turn = k % 2 == 0;
+      const double first = timed(turn ? without : with), second = timed(turn ? with : without);
+      if (k < 4) continue;
+      plain.push_back(turn ? first : second);
+      extra.push_back(turn ? second - first : first - second);
+    }
+    const double share = median(extra) / median(plain);
+    std::cout << count << " obstacles: " << 1e3 * median(plain) << " ms a step, " << 100 * share << " % more with them\n";
+    EXPECT_LT(share, 0.01) << count << " obstacles";
+    EXPECT_EQ(hash_of(with), hash_of(without)) << "far obstacles changed the lava";
+  }
+}
+
+}  // namespace
+}  // namespace effuse::flow
