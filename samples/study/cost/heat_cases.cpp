@@ -70,7 +70,7 @@ CaseResult crust_cells(bool full) {
     result.measures.push_back({fmt::format("{}: error with 16 cells over that without any", curve), "", usual.error, none.error, usual.error / none.error, 0.2, "x"});
   }
   const CostPoint none = at("particles of 50 cm", "no column"), eight = at("particles of 50 cm", "8 cells"), usual = at("particles of 50 cm", "16 cells");
-  result.plots.push_back(convergence_plot("heat_cells", fmt::format("Surface of cooling lava, particles of 50 cm: {:.2g} % off without a crust's column, {:.2g} % with 8 cells, {:.2g} % with 16", 100 * none.error, 100 * eight.error, 100 * usual.error), "cells of the crust (1: none)",
+  result.plots.push_back(convergence_plot("heat_cells", fmt::format("Surface of cooling lava, particles of 50 cm: {:.0f} % off without a crust's column, {:.2g} % with 8 cells, {:.2g} % with 16", 100 * none.error, 100 * eight.error, 100 * usual.error), "cells of the crust (1: none)",
                                           "largest relative error of the surface in degC", result.costs, {}));
   result.plots.push_back(cost_plot("heat_cells_cost", fmt::format("Cells of the crust: 16 take {:.2g} times the time of none", usual.seconds / none.seconds), "largest relative error of the surface in degC", result.costs));
   result.note = "Lava of 1150 degC, emissivity 0.95, h 50 W/m2/K, 40 % vesicles, ten seconds to an hour; lattices endless in x and y.";
