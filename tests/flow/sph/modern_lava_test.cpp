@@ -399,7 +399,7 @@ TEST(ModernLava, ShorterStepsDoNotLoseWhatAStepAdds) {
   }
 }
 
-TEST(ModernLava, AColumnRestsInStepsOfAnyLength) {
+TEST(ModernLavaSlow, AColumnRestsInStepsOfAnyLength) {
   for (const Real step : {0.05, 5e-3, 5e-4}) {
     ModernOptions o = isothermal(0.1, 100);
     o.period = Vec2(0.8, 0.8);
