@@ -6,10 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "flow/reference/channel.h"
-#include "flow/reference/thin_film.h"
 #include "geometry/base/check.h"
-#include "geometry/base/error.h"
 #include "geometry/base/parallel.h"
 #include "samples/study/cost/cost.h"
 #include "samples/study/cost/flows.h"
@@ -22,15 +19,7 @@ namespace effuse::study {
 
 using flow::sph::ClassicLava;
 using flow::sph::ClassicOptions;
-using flow::sph::ModernLava;
 using flow::sph::ModernOptions;
-namespace reference = flow::reference;
-
-namespace {
-
-constexpr Real kInfinity = std::numeric_limits<Real>::infinity();
-
-}  // namespace
 
 PeriodicClassic::PeriodicClassic(const ClassicOptions& options, const Vec2& period, std::span<const Vec3> x) : period_(period) {
   CHECK_EQ(flow::evaluations(options.scheme), 1);

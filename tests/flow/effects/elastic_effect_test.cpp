@@ -2,60 +2,19 @@
 
 #include <gtest/gtest.h>
 
-#include "flow/effects/registry.h"
-#include "flow/scene/simulation.h"
 #include "geometry/base/error.h"
 #include "geometry/base/parallel.h"
 #include "geometry/mesh/measure.h"
 #include "geometry/mesh/validate.h"
-#include "geometry/terrain/plane.h"
-#include "importers/scene/scene_file.h"
+#include "tests/flow/effects/small_scene.h"
 
 namespace effuse::flow {
 namespace {
 
-/// Elastic solids over level ground at 0, 24 frames a second.
-struct ElasticScene {
-  Node node;
-  Scene scene;
-  geometry::Terrain terrain = geometry::Terrain::from_height_field(geometry::make_plane(Vec2(100, 100)));
-  std::vector<PlacedObstacle> obstacles;
-  std::unique_ptr<Simulation> simulation;
-
-  explicit ElasticScene(const std::string& text) : node(importers::read_scene_text("[film]\nframes = 9999\n[terrain]\nplane = { size = [100, 100] }\n" + text, "test.toml")) {
-    Parameters root(node);
-    scene = read_scene(root, effect_kinds());
-    root.finish();
-    std::vector<Fault> faults;
-    for (const PlannedObstacle& plan : scene.obstacles) place_obstacle(plan, mesh_of(plan), terrain, obstacles, faults);
-    World world{&terrain, 1, &obstacles};
-    world.mesh = [](const PlannedForm&) { return geometry::TriMesh(); };
-    simulation = std::make_unique<Simulation>(scene, world);
-  }
-  void frames(int n) {
-    for (int k = 0; k < n; ++k) simulation->advance([] { return true; });
-  }
-  geometry::TriMesh mesh() const { return simulation->effects()[0]->meshes().at(0).mesh; }
-  double figure(const std::string& name) const {
-    for (const auto& [key, value] : simulation->effects()[0]->figures())
-      if (key == name) return value;
-    return -1;
-  }
-};
-
-std::string fault_of(const std::string& text) {
-  try {
-    ElasticScene scene(text);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
-}
-
 constexpr const char* kBall = "[[elastic]]\nball = 0.5\nspacing = 0.3\nstep = 0.02\nposition = [0, 0, 0.8]\nyoungs_modulus = \"40 kPa\"\ndensity = 500\n";
 
 TEST(ElasticEffect, ABallFallsAndComesToRestOnTheGround) {
-  ElasticScene scene(std::string(kBall) + "damping = 0.05\n");
+  SmallScene scene(std::string(kBall) + "damping = 0.05\n");
   // 1,280 triangles of the sphere hold 99.3 % of its volume, and weigh it.
   EXPECT_NEAR(scene.figure("mass_kg"), 500 * 0.5236, 3);
   scene.frames(24 * 3);
@@ -74,7 +33,7 @@ TEST(ElasticEffect, ABallFallsAndComesToRestOnTheGround) {
 }
 
 TEST(ElasticEffectSlow, NearlyIncompressibleItKeepsItsVolumeThroughAFall) {
-  ElasticScene scene("[[elastic]]\nbox = [0.6, 0.6, 0.6]\nspacing = 0.15\nstep = 0.01\nposition = [0, 0, 1]\nyoungs_modulus = \"50 kPa\"\npoisson_ratio = 0.45\ndensity = 1000\ndamping = 0.02\n");
+  SmallScene scene("[[elastic]]\nbox = [0.6, 0.6, 0.6]\nspacing = 0.15\nstep = 0.01\nposition = [0, 0, 1]\nyoungs_modulus = \"50 kPa\"\npoisson_ratio = 0.45\ndensity = 1000\ndamping = 0.02\n");
   double worst = 0;
   for (int frame = 0; frame < 60; ++frame) {
     scene.frames(1);
@@ -91,11 +50,11 @@ TEST(ElasticEffectSlow, BreakingKeepsItsMassAndComesBackFromACheckpoint) {
   // A brittle beam falls across a bar.
   const std::string text = "[[elastic]]\nname = \"beam\"\nbox = [3, 0.3, 0.3]\nspacing = 0.15\nposition = [0, 0, 0.9]\nyoungs_modulus = \"3 MPa\"\ndensity = 2000\nstrength = \"30 kPa\"\nvelocity = [0, 0, -3]\n"
                            "[[obstacle]]\nbox = [0.2, 1, 0.4]\nposition = [0, 0, 0.2]\non_ground = false\n";
-  ElasticScene scene(text);
+  SmallScene scene(text);
   EXPECT_NEAR(scene.figure("mass_kg"), 540, 1e-6);
   scene.frames(4);
   const std::string bytes = scene.simulation->checkpoint("key");
-  ElasticScene again(text);
+  SmallScene again(text);
   again.simulation->restore(bytes, "key", "checkpoint");
   {
     const ThreadLimit one(1);
@@ -114,12 +73,12 @@ TEST(ElasticEffectSlow, BreakingKeepsItsMassAndComesBackFromACheckpoint) {
 
 TEST(ElasticEffectSlow, PinsHoldAndAnObstacleCarriesThem) {
   const std::string beam = "[[elastic]]\nbox = [1, 0.2, 0.2]\nspacing = 0.1\nposition = [0, 0, 2]\nyoungs_modulus = \"1 MPa\"\ndensity = 1000\nstep = 0.02\npins = [[-0.5, 0, 2, 0.2]]\n";
-  ElasticScene still(beam);
+  SmallScene still(beam);
   still.frames(24);
   const Box3 box = geometry::bounds(still.mesh());
   EXPECT_NEAR(box.min().x(), -0.5, 1e-9);
   EXPECT_LT(box.min().z(), 1.88) << "its free end hangs";
-  ElasticScene carried(beam + "pinned_to = \"crane\"\n[[obstacle]]\nname = \"crane\"\nbox = [0.1, 0.1, 0.1]\non_ground = false\nmotion = \"linear\"\n[[obstacle.key]]\ntime = 0\nposition = [0, 0, 5]\n[[obstacle.key]]\ntime = 1\nposition = [0, 0, 6]\n");
+  SmallScene carried(beam + "pinned_to = \"crane\"\n[[obstacle]]\nname = \"crane\"\nbox = [0.1, 0.1, 0.1]\non_ground = false\nmotion = \"linear\"\n[[obstacle.key]]\ntime = 0\nposition = [0, 0, 5]\n[[obstacle.key]]\ntime = 1\nposition = [0, 0, 6]\n");
   carried.frames(24);
   EXPECT_NEAR(geometry::bounds(carried.mesh()).max().z(), 3.1, 0.15);
 }

@@ -4,13 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <iostream>
 
 #include "flow/sph/modern_lava.h"
-#include "geometry/base/hash.h"
 #include "geometry/base/parallel.h"
 #include "geometry/procedural/primitives.h"
+#include "tests/flow/sph/lava_times.h"
 #include "tests/flow/sph/sample_system.h"
 
 /// What things that lava does not reach cost it.
@@ -20,7 +19,10 @@ namespace {
 using geometry::CollisionMesh;
 using geometry::PoseKey;
 using geometry::PoseTrack;
+using sph::hex_of;
+using sph::median;
 using sph::ModernLava;
+using sph::thread_seconds;
 
 constexpr Real kSpacing = 0.5;
 
@@ -57,23 +59,6 @@ std::vector<PlacedObstacle> around(int count) {
   return all;
 }
 
-double thread_seconds() {
-  timespec t{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
-
-double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-  return values[values.size() / 2];
-}
-
-std::string hash_of(const ModernLava& lava) {
-  StateHash hash;
-  lava.add_to(hash);
-  return hash.hex();
-}
-
 /// Standard error of a median, from the values' own scatter about it: 1.253 sigma / sqrt(n), sigma = 1.4826 of the median deviation.
 double error_of_median(std::vector<double> values) {
   const double middle = median(values);
@@ -106,7 +91,7 @@ TEST(SolidWorldCostSlow, ObstaclesFarFromTheLavaCostLessThanAHundredthMore) {
     const double share = median(extra) / median(plain), error = error_of_median(extra) / median(plain);
     std::cout << count << " obstacles: " << 1e3 * median(plain) << " ms a step, " << 100 * share << " +- " << 100 * error << " % more with them\n";
     EXPECT_LT(share - 2 * error, 0.01) << count << " obstacles";
-    EXPECT_EQ(hash_of(with), hash_of(without)) << "far obstacles changed the lava";
+    EXPECT_EQ(hex_of(with), hex_of(without)) << "far obstacles changed the lava";
   }
 }
 

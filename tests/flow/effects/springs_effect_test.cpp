@@ -2,59 +2,18 @@
 
 #include <gtest/gtest.h>
 
-#include "flow/effects/registry.h"
-#include "flow/scene/simulation.h"
 #include "geometry/base/error.h"
 #include "geometry/mesh/measure.h"
-#include "geometry/terrain/plane.h"
-#include "importers/scene/scene_file.h"
+#include "tests/flow/effects/small_scene.h"
 
 namespace effuse::flow {
 namespace {
-
-/// Springs over level ground at 0, 24 frames a second.
-struct SpringsScene {
-  Node node;
-  Scene scene;
-  geometry::Terrain terrain = geometry::Terrain::from_height_field(geometry::make_plane(Vec2(100, 100)));
-  std::vector<PlacedObstacle> obstacles;
-  std::unique_ptr<Simulation> simulation;
-
-  explicit SpringsScene(const std::string& text) : node(importers::read_scene_text("[film]\nframes = 9999\n[terrain]\nplane = { size = [100, 100] }\n" + text, "test.toml")) {
-    Parameters root(node);
-    scene = read_scene(root, effect_kinds());
-    root.finish();
-    std::vector<Fault> faults;
-    for (const PlannedObstacle& plan : scene.obstacles) place_obstacle(plan, mesh_of(plan), terrain, obstacles, faults);
-    World world{&terrain, 1, &obstacles};
-    world.mesh = [](const PlannedForm&) { return geometry::TriMesh(); };
-    simulation = std::make_unique<Simulation>(scene, world);
-  }
-  void frames(int n) {
-    for (int k = 0; k < n; ++k) simulation->advance([] { return true; });
-  }
-  geometry::TriMesh mesh() const { return simulation->effects()[0]->meshes().at(0).mesh; }
-  double figure(const std::string& name) const {
-    for (const auto& [key, value] : simulation->effects()[0]->figures())
-      if (key == name) return value;
-    return -1;
-  }
-};
-
-std::string fault_of(const std::string& text) {
-  try {
-    SpringsScene scene(text);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
-}
 
 constexpr const char* kCube = "[[springs]]\npoints = 4\nsize = 1\nposition = [0, 0, 1.5]\ndensity = 100\nstiffness = 2000\ndamping = 20\n";
 
 TEST(SpringsEffect, ACubeFallsAndComesToRestOnTheGround) {
   for (const char* scheme : {"symplectic_euler", "rk4", "implicit_euler"}) {
-    SpringsScene scene(std::string(kCube) + "contact_damping = 50\nscheme = \"" + scheme + "\"\n");
+    SmallScene scene(std::string(kCube) + "contact_damping = 50\nscheme = \"" + scheme + "\"\n");
     scene.frames(24 * 8);
     const Box3 box = geometry::bounds(scene.mesh());
     // 16 points stand on springs of 4000 N/m each under 981 N: 15 mm.
@@ -65,17 +24,17 @@ TEST(SpringsEffect, ACubeFallsAndComesToRestOnTheGround) {
 }
 
 TEST(SpringsEffect, StandsOnObstaclesToo) {
-  SpringsScene scene(std::string(kCube) + "contact_damping = 50\n[[obstacle]]\nbox = [4, 4, 1]\nposition = [0, 0, 0]\non_ground = false\n");
+  SmallScene scene(std::string(kCube) + "contact_damping = 50\n[[obstacle]]\nbox = [4, 4, 1]\nposition = [0, 0, 0]\non_ground = false\n");
   scene.frames(24 * 6);
   EXPECT_NEAR(geometry::bounds(scene.mesh()).min().z(), 0.5, 0.03);
 }
 
 TEST(SpringsEffect, PinsHoldAndAnObstacleCarriesThem) {
   const std::string pinned = std::string(kCube) + "gravity = [0, 0, -1]\npins = [[-0.5, -0.5, 2, 0.01], [0.5, -0.5, 2, 0.01], [-0.5, 0.5, 2, 0.01], [0.5, 0.5, 2, 0.01]]\n";
-  SpringsScene still(pinned);
+  SmallScene still(pinned);
   still.frames(48);
   EXPECT_NEAR(geometry::bounds(still.mesh()).max().z(), 2, 1e-9);
-  SpringsScene carried(pinned + "pinned_to = \"crane\"\n[[obstacle]]\nname = \"crane\"\nbox = [0.1, 0.1, 0.1]\non_ground = false\nmotion = \"linear\"\n[[obstacle.key]]\ntime = 0\nposition = [0, 0, 5]\n[[obstacle.key]]\ntime = 2\nposition = [4, 0, 7]\n");
+  SmallScene carried(pinned + "pinned_to = \"crane\"\n[[obstacle]]\nname = \"crane\"\nbox = [0.1, 0.1, 0.1]\non_ground = false\nmotion = \"linear\"\n[[obstacle.key]]\ntime = 0\nposition = [0, 0, 5]\n[[obstacle.key]]\ntime = 2\nposition = [4, 0, 7]\n");
   carried.frames(48);
   EXPECT_NEAR(geometry::bounds(carried.mesh()).max().z(), 4, 0.05);  // what hangs free about the four swings
   EXPECT_NEAR(geometry::bounds(carried.mesh()).center().x(), 4, 0.3);
@@ -84,12 +43,12 @@ TEST(SpringsEffect, PinsHoldAndAnObstacleCarriesThem) {
 TEST(SpringsEffect, TornFacesAreGoneAndStayGoneInACheckpoint) {
   // Too heavy for its springs, it falls off where it is held.
   const std::string text = "[[springs]]\npoints = 4\nsize = 1\nposition = [0, 0, 3]\nmass = 600\nstiffness = 500\ndamping = 5\ntear_strain = 0.3\npins = [[0, 0, 3.5, 0.8]]\nspin = [0, 0, 0]\n";
-  SpringsScene scene(text);
+  SmallScene scene(text);
   scene.frames(24);
   EXPECT_GT(scene.figure("torn"), 0);
   EXPECT_LT(scene.mesh().triangles.size(), 6u * 9 * 2);
   const std::string bytes = scene.simulation->checkpoint("key");
-  SpringsScene again(text);
+  SmallScene again(text);
   again.simulation->restore(bytes, "key", "checkpoint");
   scene.frames(5);
   again.frames(5);
@@ -99,7 +58,7 @@ TEST(SpringsEffect, TornFacesAreGoneAndStayGoneInACheckpoint) {
 
 TEST(SpringsEffect, AStepThatBlowsUpIsTakenInSmallerOnesOrRefused) {
   // Euler without damping is unstable at any step: it is found out, the state is that of before.
-  SpringsScene scene("[[springs]]\npoints = 3\nsize = 1\nposition = [0, 0, 2]\nmass = 1\nstiffness = 1e6\nscheme = \"euler\"\nstep = 0.02\nvelocity = [0, 0, -1]\n");
+  SmallScene scene("[[springs]]\npoints = 3\nsize = 1\nposition = [0, 0, 2]\nmass = 1\nstiffness = 1e6\nscheme = \"euler\"\nstep = 0.02\nvelocity = [0, 0, -1]\n");
   EXPECT_THROW(scene.frames(2000), UnstableError);
   EXPECT_TRUE(geometry::bounds(scene.mesh()).sizes().allFinite());
 }

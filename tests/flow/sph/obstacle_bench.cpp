@@ -3,14 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <ctime>
 #include <vector>
 
 #include "flow/sph/modern_lava.h"
-#include "geometry/base/hash.h"
 #include "geometry/base/parallel.h"
 #include "geometry/base/zones.h"
 #include "geometry/procedural/primitives.h"
+#include "tests/flow/sph/lava_times.h"
 
 /// What obstacles cost lava, on one thread, in processor time.
 ///
@@ -69,23 +68,6 @@ geometry::TriMesh house(const Vec3& low, const Vec3& high) {
   return m;
 }
 
-double processor_seconds() {
-  timespec t{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
-
-double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-  return values[values.size() / 2];
-}
-
-std::string hash_of(const ModernLava& lava) {
-  StateHash hash;
-  lava.add_to(hash);
-  return hash.hex();
-}
-
 void FarObstacles(benchmark::State& state) {
   const ThreadLimit limit(1);
   Obstacles obstacles;
@@ -104,9 +86,9 @@ void FarObstacles(benchmark::State& state) {
   Profile profile;
   const ProfileScope scope(profile);
   const auto timed = [](ModernLava& lava) {
-    const double before = processor_seconds();
+    const double before = thread_seconds();
     lava.step(0.02);
-    return processor_seconds() - before;
+    return thread_seconds() - before;
   };
   bool turn = false;
   for (auto _ : state) {
@@ -126,7 +108,7 @@ void FarObstacles(benchmark::State& state) {
   state.counters["solids_percent"] = 100 * solids / (step / 2);
   state.counters["step_ms"] = 1e3 * median(plain);
   state.counters["extra_percent"] = 100 * median(extra) / median(plain);
-  state.SetLabel(std::to_string(with.size()) + " " + hash_of(with) + (hash_of(with) == hash_of(without) ? " same" : " differs"));
+  state.SetLabel(std::to_string(with.size()) + " " + hex_of(with) + (hex_of(with) == hex_of(without) ? " same" : " differs"));
 }
 BENCHMARK(FarObstacles)->ArgName("obstacles")->Arg(0)->Arg(1)->Arg(100)->Arg(10000)->UseManualTime()->Unit(benchmark::kMillisecond);
 
@@ -149,7 +131,7 @@ void HouseInLava(benchmark::State& state) {
   }
   state.counters["solids_percent"] = 100 * solids / step;
   state.counters["edges_percent"] = 100 * edges / step;
-  state.SetLabel(std::to_string(lava.size()) + " " + hash_of(lava));
+  state.SetLabel(std::to_string(lava.size()) + " " + hex_of(lava));
 }
 BENCHMARK(HouseInLava)->Unit(benchmark::kMillisecond);
 
