@@ -59,6 +59,7 @@ FileFacts describe_grid(const fs::path& file, const ReadLimits& limits) {
   Lines& lines = facts.lines;
   lines.push_back(fmt::format("terrain grid: {} x {} posts, {:.6g} x {:.6g} m apart: {:.6g} x {:.6g} m", field.nx(), field.ny(),
                               field.spacing().x(), field.spacing().y(), size.x(), size.y()));
+  lines.push_back("format: " + format);
   lines.push_back(fmt::format("covers: x {:.10g} to {:.10g}, y {:.10g} to {:.10g}", corner.x(), corner.x() + size.x(), corner.y(), corner.y() + size.y()));
   lines.push_back(fmt::format("heights: {:.6g} to {:.6g} m", low, high));
   lines.push_back(holes == 0 ? std::string("holes: none") : fmt::format("holes: {} posts without data ({:.1f} %)", holes, 100 * share));
@@ -113,10 +114,12 @@ FileFacts describe_mesh(const fs::path& file, const ReadLimits& limits) {
   FileFacts facts;
   Lines& lines = facts.lines;
   lines.push_back("mesh: " + to_string(report));
+  lines.push_back("format: " + lower_extension(file).substr(1));
   std::optional<std::size_t> crossings;
-  if (report.triangles <= kMostTested) crossings = geometry::self_intersections(mesh).size();
+  if (report.triangles <= kMostTested) crossings = geometry::self_intersections(mesh, kMostCrossings).size();
+  const bool more = crossings == kMostCrossings;
   lines.push_back(!crossings ? fmt::format("self-intersections: not looked for, in more than {} triangles", kMostTested)
-                             : *crossings == 0 ? std::string("self-intersections: none") : fmt::format("self-intersections: {} pairs of triangles", *crossings));
+                             : *crossings == 0 ? std::string("self-intersections: none") : fmt::format("self-intersections: {}{} pairs of triangles", *crossings, more ? " or more" : ""));
   lines.push_back(fmt::format("box: {:.10g} .. {:.10g}, {:.10g} .. {:.10g}, {:.10g} .. {:.10g} m", box.min().x(), box.max().x(), box.min().y(),
                               box.max().y(), box.min().z(), box.max().z()));
   const Real area = geometry::surface_area(mesh);
@@ -154,6 +157,7 @@ FileFacts describe_mesh(const fs::path& file, const ReadLimits& limits) {
   values["misoriented_edges"] = report.misoriented_edges;
   values["degenerate_triangles"] = report.zero_area + report.repeated_indices;
   values["self_intersections"] = crossings ? json(*crossings) : json();
+  values["self_intersections_or_more"] = more;
   values["low"] = list(box.min());
   values["high"] = list(box.max());
   values["area_m2"] = area;

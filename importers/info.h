@@ -27,5 +27,6 @@ FileFacts file_facts(const std::filesystem::path& file, const ReadLimits& limits
 std::vector<std::string> describe_file(const std::filesystem::path& file);
 
 inline constexpr std::size_t kMostTested = 2'000'000;  ///< a few seconds
+inline constexpr std::size_t kMostCrossings = 1'000'000;  ///< of n triangles in one place there are n^2 / 2: counted no further
 
 }  // namespace effuse::importers

@@ -1,10 +1,14 @@
 #include "importers/input_file.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <charconv>
 #include <cmath>
+#include <cstring>
 #include <system_error>
 
 #include "geometry/base/error.h"
@@ -32,6 +36,10 @@ void check_input(const fs::path& file, std::uint64_t limit, std::string_view wha
   if (error) throw InputError(place, "cannot read: " + error.message());
   if (size == 0) throw InputError(place, "the file is empty");
   if (size > limit) throw InputError(place, fmt::format("is too large for {}: {} bytes, at most {}", what, size, limit));
+  // Packages say of a file that they may not open that it is none of theirs.
+  const int opened = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  if (opened < 0) throw InputError(place, fmt::format("cannot read: {}", std::strerror(errno)));
+  ::close(opened);
 }
 
 std::string printable(std::string_view text, std::size_t limit) {

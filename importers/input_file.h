@@ -15,6 +15,10 @@ std::string read_input(const std::filesystem::path& file, std::uint64_t limit, s
 /// The same questions without reading: for files that a package opens itself. Throws as read_input does.
 void check_input(const std::filesystem::path& file, std::uint64_t limit, std::string_view what);
 
+/// Map coordinates and extents beyond this are no place on a planet, smaller extents no thing to see: a wrong byte order, a wrong unit,
+/// noise that happens to be numbers [m].
+inline constexpr double kFarthest = 1e9, kFinest = 1e-6;
+
 /// "'12,5'": a piece of a file in quotes, cut to 40 characters, what cannot be printed as '?'.
 std::string quote(std::string_view text);
 

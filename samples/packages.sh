@@ -7,9 +7,10 @@ set -eu
 build_packages="
   g++ cmake ninja-build ccache git
   libcgal-dev libeigen3-dev libassimp-dev libgdal-dev libopenvdb-dev libboost-iostreams-dev libtbb-dev libfcl-dev libembree-dev
-  libcli11-dev libtomlplusplus-dev libfmt-dev nlohmann-json3-dev libpng-dev zlib1g-dev libcairo2-dev"
+  libcli11-dev libtomlplusplus-dev libfmt-dev nlohmann-json3-dev libpng-dev libopenexr-dev zlib1g-dev libcairo2-dev"
 test_packages="
-  libgtest-dev libgmock-dev libbenchmark-dev libbullet-dev assimp-utils libopenvdb-tools ca-certificates"
+  libgtest-dev libgmock-dev libbenchmark-dev libbullet-dev debootstrap dpkg-dev assimp-utils libopenvdb-tools chromium ca-certificates
+  blender paraview python3-paraview python3-numpy xvfb libgl1-mesa-dri"
 
 case "${1:-build}" in
   build) wanted=$build_packages ;;

@@ -327,12 +327,16 @@ void collide_terrain(Index a, const PlacedShape& A, const GroundShape& ground, s
   }
   if (!fine) return;
 
-  // Points of the ground that stick into the body.
+  // Points of the ground that stick into the body. One pushes it the way out of its side only if that is a way out of the ground, too: a post of
+  // flat ground just before a side is no peak that could stop it.
+  const Real step_out = 1e-3 * bound;
   found.clear();
   Box3 box = A.shape->bounds(A.x, A.R);
   box = Box3(box.min() - Vec3::Constant(A.margin), box.max() + Vec3::Constant(A.margin));
   ground.points_near(box, [&](const Vec3& point) {
-    if (probe(A, point, point, A.margin, p)) found.push_back(p);
+    if (!probe(A, point, point, A.margin, p)) return;
+    const geometry::Contact out_there = terrain.contact(point - step_out * p.outward, 2 * step_out);
+    if (!out_there.any() || out_there.distance >= 0.9999 * step_out) found.push_back(p);
   });
   thin_out(found);
   append_probes(a, A, kTerrain, nullptr, found, false, out);

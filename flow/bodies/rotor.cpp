@@ -5,6 +5,7 @@
 
 #include "flow/integrate/integrate.h"
 #include "geometry/base/check.h"
+#include "geometry/motion/pose_track.h"
 
 namespace effuse::flow::bodies {
 namespace {
@@ -50,7 +51,7 @@ Quat split(Quat q, const Vec3& L, const Vec3& I, Real dt) {
 
 /// v = dt w(exp(v / 2) q): the turn of the step. F(v) = v - dt w(exp(v/2) q) = 0.
 Quat midpoint(const Quat& q, const Vec3& L, const Vec3& I, Real dt) {
-  const auto F = [&](const Vec3& v) { return Vec3(v - dt * angular_velocity(rotation(v / 2) * q, L, I)); };
+  const auto F = [&](const Vec3& v) { return Vec3(v - dt * angular_velocity(geometry::rotation_by(v / 2) * q, L, I)); };
   Vec3 v = dt * angular_velocity(q, L, I);
   Vec3 f = F(v);
   for (int k = 0; k < 50; ++k) {
@@ -63,7 +64,7 @@ Quat midpoint(const Quat& q, const Vec3& L, const Vec3& I, Real dt) {
     f = F(v);
     if (!(change.norm() > 1e-15 * (1 + v.norm()))) break;
   }
-  return (rotation(v) * q).normalized();
+  return (geometry::rotation_by(v) * q).normalized();
 }
 
 struct Turn {
@@ -85,13 +86,6 @@ struct TurnRates {
 
 }  // namespace
 
-Quat rotation(const Vec3& v) {
-  const Real half = v.norm() / 2;
-  // sin(half) / (2 half): its series where the quotient would lose digits.
-  const Real s = half > 1e-4 ? std::sin(half) / (2 * half) : (1 - half * half / 6) / 2;
-  return Quat(std::cos(half), s * v.x(), s * v.y(), s * v.z());
-}
-
 Quat turn_freely(RotorScheme scheme, const Quat& q, const Vec3& L, const Vec3& moments, Real dt) {
   DCHECK(moments.minCoeff() > 0);
   switch (scheme) {
@@ -103,7 +97,7 @@ Quat turn_freely(RotorScheme scheme, const Quat& q, const Vec3& L, const Vec3& m
       integrate_step(Scheme::kRk4, TurnRates{L, moments}, 0, dt, y, storage);
       return Quat(y.q).normalized();
     }
-    case RotorScheme::kSymplecticEuler: return (rotation(dt * angular_velocity(q, L, moments)) * q).normalized();
+    case RotorScheme::kSymplecticEuler: return (geometry::rotation_by(dt * angular_velocity(q, L, moments)) * q).normalized();
   }
   throw std::logic_error("turn_freely: no such scheme");
 }

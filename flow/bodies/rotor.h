@@ -32,7 +32,4 @@ inline Vec3 angular_velocity(const Quat& q, const Vec3& L, const Vec3& moments) 
   return q * (q.conjugate() * L).cwiseQuotient(moments);
 }
 
-/// The rotation by the vector v: about v, by |v| [rad].
-Quat rotation(const Vec3& v);
-
 }  // namespace effuse::flow::bodies

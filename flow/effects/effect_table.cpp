@@ -8,12 +8,16 @@
 
 namespace effuse::flow {
 
-std::string read_effect_name(Parameters& p, const std::string& usual) {
+void check_effect_name(Parameters& p, const std::string& name) {
   static constexpr std::array<std::string_view, 4> kTaken = {"skin", "lava", "obstacles", "terrain"};
-  const std::string name = p.text("name", usual, "for files: frames/NAME.####.*");
   if (name.empty() || name.find_first_of("/\\\n") != std::string::npos || name.find('\0') != std::string::npos || name == "." || name == "..")
     p.fault("name", fmt::format("'{}' cannot be part of a file's name", name));
   if (std::find(kTaken.begin(), kTaken.end(), name) != kTaken.end()) p.fault("name", fmt::format("'{}' is the name of files of something else, wanted another", name));
+}
+
+std::string read_effect_name(Parameters& p, const std::string& usual) {
+  const std::string name = p.text("name", usual, "for files: frames/NAME.####.*");
+  check_effect_name(p, name);
   return name;
 }
 

@@ -9,7 +9,10 @@
 /// What tables of many effects have in common.
 namespace effuse::flow {
 
-/// The key name: what files are called by. A fault where it cannot be part of a file's name, or is that of files of other things.
+/// A fault where a name that files are called by cannot be part of one, or is that of files of other things.
+void check_effect_name(Parameters& p, const std::string& name);
+
+/// The key name, checked.
 std::string read_effect_name(Parameters& p, const std::string& usual);
 
 /// Three numbers, or the usual ones.

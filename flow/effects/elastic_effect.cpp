@@ -6,12 +6,13 @@
 #include <cmath>
 #include <optional>
 
+#include "flow/effects/effect_table.h"
 #include "flow/effects/elastic_shape.h"
+#include "flow/effects/met_things.h"
 #include "flow/scene/placing.h"
 #include "geometry/base/error.h"
 #include "geometry/base/parallel.h"
 #include "geometry/base/zones.h"
-#include "geometry/collide/obstacles.h"
 #include "geometry/mesh/measure.h"
 
 namespace effuse::flow {
@@ -46,14 +47,9 @@ struct ElasticSettings {
 class ElasticEffect final : public Effect {
  public:
   ElasticEffect(const ElasticSettings& settings, const World& world, ElasticShape shape)
-      : settings_(settings), terrain_(world.terrain), shape_(std::move(shape)), solid_(shape_.tets, shape_.material) {
-    if (world.obstacles)
-      for (const PlacedObstacle& each : *world.obstacles) {
-        if (each.name == settings.pinned_to) driver_ = each.track;
-        if (!settings.meets) continue;
-        obstacles_.add({each.shape, geometry::RigidMotion{each.track.at(0), each.track.at(0), 1}, each.temperature, static_cast<Index>(obstacles_.size() + 1)});
-        tracks_.push_back(each.track);
-      }
+      : settings_(settings), terrain_(world.terrain), shape_(std::move(shape)), solid_(shape_.tets, shape_.material), things_(settings.meets ? world : World{}) {
+    for (const auto& each : world.obstacles ? *world.obstacles : std::vector<PlacedObstacle>())
+      if (each.name == settings.pinned_to) driver_ = each.track;
     solid_.gravity = settings.gravity;
     solid_.response = settings.response;
     const Vec3 middle = settings.pose.position;
@@ -68,6 +64,7 @@ class ElasticEffect final : public Effect {
   }
 
   std::string_view name() const override { return settings_.form.name; }
+  void meet(const std::vector<Effect*>& others) override { things_.meet(others); }
   Real time() const override { return time_; }
 
   void step(Real t_end) override {
@@ -103,6 +100,7 @@ class ElasticEffect final : public Effect {
     out.value("retries", retries_);
     out.value("split", split_);
     out.value("unsolved", unsolved_);
+    things_.save(out);
     solid_.save(out);
   }
   void load(StateReader& in) override {
@@ -111,6 +109,7 @@ class ElasticEffect final : public Effect {
     in.value("retries", retries_);
     in.value("split", split_);
     in.value("unsolved", unsolved_);
+    things_.load(in);
     solid_.load_state(in);
   }
   std::vector<std::pair<std::string, double>> figures() const override {
@@ -157,23 +156,8 @@ class ElasticEffect final : public Effect {
     contacts.clear();
     const Real fastest = parallel_max(x.size(), 0.0, [&](std::size_t i) { return solid_.state().v[i].norm(); });
     const Real reach = settings_.thickness + 2 * (fastest + settings_.gravity.norm() * dt) * dt + shape_.spacing / 2;
-    const auto take = [&](std::size_t i, const geometry::Contact& c) {
-      contacts.push_back({static_cast<Index>(i), Vec3(x[i] + (settings_.thickness - c.distance) * c.normal), c.normal, c.surface_velocity});
-    };
-    if (terrain_) {
-      found_.resize(x.size());
-      terrain_->contacts(x, reach, found_);
-      for (std::size_t i = 0; i < found_.size(); ++i)
-        if (found_[i].any()) take(i, found_[i]);
-    }
-    if (tracks_.empty()) return;
-    for (std::size_t k = 0; k < tracks_.size(); ++k) obstacles_.move(k, {tracks_[k].at(time_), tracks_[k].at(time_ + dt), dt});
-    obstacles_.update();
-    constexpr int kPerPoint = 3;
-    found_.resize(kPerPoint * x.size());
-    obstacles_.contacts(x, reach, kPerPoint, found_);
-    for (std::size_t q = 0; q < found_.size(); ++q)
-      if (found_[q].any()) take(q / kPerPoint, found_[q]);
+    things_.move(time_, dt);
+    things_.add_planes(terrain_, x, reach, settings_.thickness, contacts);
   }
 
   ElasticSettings settings_;
@@ -181,24 +165,17 @@ class ElasticEffect final : public Effect {
   ElasticShape shape_;
   ElasticSolid solid_;
   std::vector<Vec3> start_;
-  geometry::Obstacles obstacles_;
-  std::vector<geometry::PoseTrack> tracks_;
+  MetThings things_;
   std::optional<geometry::PoseTrack> driver_;
-  std::vector<geometry::Contact> found_;
   Real time_ = 0, mass_ = 0;
   std::uint64_t steps_ = 0, retries_ = 0, split_ = 0, unsolved_ = 0;
 };
-
-Vec3 vector(Parameters& p, const char* key, const char* unit, const Vec3& usual, const char* what) {
-  const std::vector<Real> v = p.numbers(key, unit, 3, false, what);
-  return v.size() == 3 ? Vec3(v[0], v[1], v[2]) : usual;
-}
 
 ElasticSettings read(Parameters& p) {
   ElasticSettings s;
   read_form(p, "closed mesh, relative to the scene file", s.form);
   const std::string& name = s.form.name;
-  if (name.empty() || name.find_first_of("/\\\n") != std::string::npos) p.fault("name", fmt::format("'{}' cannot be part of a file's name", name));
+  check_effect_name(p, name);
   s.spacing = p.number("spacing", "m", std::nullopt, Parameters::positive(), "of its tetrahedra: the resolution");
   fem::ElasticMaterial& m = s.material;
   m.youngs_modulus = p.number("youngs_modulus", "Pa", std::nullopt, Parameters::positive(), "stiffness: jelly 10 kPa, rubber 5 MPa, wood 10 GPa, concrete 30 GPa");
@@ -208,11 +185,11 @@ ElasticSettings read(Parameters& p) {
   m.strength = p.number("strength", "Pa", 0, Parameters::not_negative(), "tension at which it breaks; 0: never");
   s.pose = read_pose(p, false, {});
   s.on_ground = p.flag("on_ground", false, "its height counts from the terrain at x, y");
-  s.velocity = vector(p, "velocity", "m/s", s.velocity, "at the start");
-  s.spin = vector(p, "spin", "rad/s", s.spin, "at the start, about its position");
+  s.velocity = read_vector(p, "velocity", "m/s", s.velocity, "at the start");
+  s.spin = read_vector(p, "spin", "rad/s", s.spin, "at the start, about its position");
   for (const std::vector<Real>& pin : p.number_lists("pins", "m", 4, false, "[x, y, z, radius]: points that start this near are held")) s.pins.push_back({Vec3(pin[0], pin[1], pin[2]), pin[3]});
   s.pinned_to = p.text("pinned_to", "", "obstacle that carries the held points");
-  s.gravity = vector(p, "gravity", "m/s2", s.gravity, "");
+  s.gravity = read_vector(p, "gravity", "m/s2", s.gravity, "");
   s.meets = p.flag("meets_ground", true, "and obstacles");
   const Real stiffness = 10 * m.youngs_modulus * s.spacing, mass = m.density * std::pow(s.spacing, 3) / 4;
   s.response.stiffness = p.number("contact_stiffness", "N/m", stiffness, Parameters::not_negative(), "of ground and obstacles, on each node; absent: ten times youngs_modulus times spacing");

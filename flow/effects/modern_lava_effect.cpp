@@ -12,6 +12,7 @@
 #include "flow/sph/modern_lava.h"
 #include "geometry/base/error.h"
 #include "geometry/base/parallel.h"
+#include "geometry/base/unstable_at.h"
 
 namespace effuse::flow {
 
@@ -80,12 +81,15 @@ class ModernLavaEffect final : public Effect {
 
   void step(Real t_end) override {
     if (crammed_steps_ >= kMostCrammedSteps)
-      throw UnstableError(fmt::format("at t = {:.6g} s {} of {} particles have been pressed to more than 1.5 times their density for {} steps, around ({:.6g}, {:.6g}, {:.6g}): more lava is let in there than "
+      throw UnstableAt(fmt::format("at t = {:.6g} s {} of {} particles have been pressed to more than 1.5 times their density for {} steps, around ({:.6g}, {:.6g}, {:.6g}): more lava is let in there than "
                                       "there is room for, as in a closed room of obstacles; a way out, or a lower rate, would do",
-                                      time(), last_.crammed, lava_.size(), kMostCrammedSteps, origin_.x() + last_.crammed_at.x(), origin_.y() + last_.crammed_at.y(), origin_.z() + last_.crammed_at.z()));
+                                      time(), last_.crammed, lava_.size(), kMostCrammedSteps, origin_.x() + last_.crammed_at.x(), origin_.y() + last_.crammed_at.y(), origin_.z() + last_.crammed_at.z()),
+                       last_.crammed_at);
     const Real wanted = longest_step(t_end - lava_.time());
     try {
       last_ = lava_.step(wanted);
+    } catch (const UnstableAt& error) {
+      throw UnstableAt(error.what() + blocked_vents(wanted), error.where());
     } catch (const UnstableError& error) {
       throw UnstableError(error.what() + blocked_vents(wanted));
     }

@@ -6,12 +6,12 @@
 #include <cmath>
 #include <optional>
 
+#include "flow/effects/met_things.h"
 #include "flow/effects/particles_table.h"
 #include "flow/particles/density_grid.h"
 #include "flow/scene/placing.h"
 #include "geometry/base/error.h"
 #include "geometry/base/parallel.h"
-#include "geometry/collide/obstacles.h"
 #include "geometry/collide/slide.h"
 #include "geometry/mesh/measure.h"
 
@@ -55,15 +55,10 @@ std::vector<PlannedEmitter> place_emitters(const ParticlesSettings& s, const Wor
 class ParticlesEffect final : public Effect {
  public:
   ParticlesEffect(const ParticlesSettings& settings, const World& world, std::vector<PlannedEmitter> emitters)
-      : settings_(settings), terrain_(*world.terrain), seed_(world.seed), plans_(std::move(emitters)) {
-    if (!settings.meets || !world.obstacles) return;
-    for (const PlacedObstacle& each : *world.obstacles) {
-      obstacles_.add({each.shape, geometry::RigidMotion{each.track.at(0), each.track.at(0), 1}, each.temperature, static_cast<Index>(obstacles_.size() + 1)});
-      tracks_.push_back(each.track);
-    }
-  }
+      : settings_(settings), terrain_(*world.terrain), seed_(world.seed), plans_(std::move(emitters)), things_(settings.meets ? world : World{}) {}
 
   void meet(const std::vector<Effect*>& others) override {
+    things_.meet(others);
     std::vector<Opening> openings;
     for (Effect* other : others) {
       if (other->flow().spacing > 0) lava_ = other;
@@ -100,7 +95,7 @@ class ParticlesEffect final : public Effect {
   void step(Real t_end) override {
     const Real left = t_end - time_, count = std::max(1.0, std::ceil(left / settings_.step * (1 - 1e-9))), dt = left / count;
     find_sources();
-    move_obstacles(time_, dt);
+    things_.move(time_, dt);
     std::vector<ParticleCloud::Sources> sources;
     for (const Sources& each : sources_) sources.push_back({each.x, each.v, each.share});
     cloud_->step(dt, sources);
@@ -135,11 +130,13 @@ class ParticlesEffect final : public Effect {
   void save(StateWriter& out) const override {
     out.value("time", time_);
     out.value("steps", steps_);
+    things_.save(out);
     cloud_->save(out);
   }
   void load(StateReader& in) override {
     in.value("time", time_);
     in.value("steps", steps_);
+    things_.load(in);
     cloud_->load(in);
   }
   std::vector<std::pair<std::string, double>> figures() const override {
@@ -176,15 +173,15 @@ class ParticlesEffect final : public Effect {
     if (settings_.meets)
       contacts = [this](std::span<const Vec3> x, Real reach, std::span<geometry::Contact> out) {
         terrain_.contacts(x, reach, out);
-        if (obstacles_.empty()) return;
+        if (things_.empty()) return;
         near_.resize(x.size());
-        obstacles_.contacts(x, reach, 1, near_);
+        things_.obstacles().contacts(x, reach, 1, near_);
         parallel_for(x.size(), [&](std::size_t i) { if (near_[i].distance < out[i].distance) out[i] = near_[i]; }, kGrain);
       };
-    if (!obstacles_.empty())
+    if (!things_.empty())
       move = [this](std::span<Vec3> x, std::span<const Vec3> dx, std::span<Vec3> v) {
         const Real radius = smallest_radius();
-        geometry::slide_all(obstacles_, x, dx, v, std::span(&radius, 1), {settings_.cloud.friction, settings_.cloud.on_contact == particles::OnContact::kBounce ? settings_.cloud.restitution : 0});
+        geometry::slide_all(things_.obstacles(), x, dx, v, std::span(&radius, 1), {settings_.cloud.friction, settings_.cloud.on_contact == particles::OnContact::kBounce ? settings_.cloud.restitution : 0});
       };
     cloud_ = std::make_unique<ParticleCloud>(options, std::move(emitters), std::move(contacts), std::move(move));
   }
@@ -199,14 +196,8 @@ class ParticlesEffect final : public Effect {
   void warm_up() {
     if (settings_.warm_up <= 0) return;
     const Real count = std::ceil(settings_.warm_up / settings_.step), dt = settings_.warm_up / count;
-    move_obstacles(0, 0);
+    things_.move(0, 0);
     for (Real k = 0; k < count; ++k) cloud_->step(dt);
-  }
-
-  void move_obstacles(Real t, Real dt) {
-    if (tracks_.empty()) return;
-    for (std::size_t k = 0; k < tracks_.size(); ++k) obstacles_.move(k, {tracks_[k].at(t), tracks_[k].at(t + dt), dt > 0 ? dt : 1});
-    obstacles_.update();
   }
 
   /// Lava as it is now, once for each moment it reaches.
@@ -274,8 +265,7 @@ class ParticlesEffect final : public Effect {
   geometry::Terrain terrain_;
   std::uint64_t seed_;
   std::vector<PlannedEmitter> plans_;
-  geometry::Obstacles obstacles_;
-  std::vector<geometry::PoseTrack> tracks_;
+  MetThings things_;
   std::vector<geometry::Contact> near_;
   const Effect* lava_ = nullptr;
   std::vector<std::pair<std::string, const Water*>> waters_;

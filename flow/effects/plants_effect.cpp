@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "flow/effects/effect_table.h"
 #include "flow/plants/plant_fire.h"
 #include "flow/plants/plant_look.h"
 #include "geometry/base/error.h"
@@ -282,8 +283,7 @@ PlantsSettings read(Parameters& p) {
   PlantsSettings s;
   s.place = p.place("");
   const auto positive = Parameters::positive(), not_negative = Parameters::not_negative();
-  s.name = p.text("name", "plants", "for files");
-  if (s.name.empty() || s.name.find_first_of("/\\\n") != std::string::npos) p.fault("name", fmt::format("'{}' cannot be part of a file's name", s.name));
+  s.name = read_effect_name(p, "plants");
   std::vector<std::string> kinds;
   for (const geometry::PlantKind& kind : geometry::plant_kinds()) kinds.push_back(kind.name);
   kinds.push_back("own");

@@ -6,12 +6,13 @@
 #include <cmath>
 #include <optional>
 
+#include "flow/effects/effect_table.h"
+#include "flow/effects/met_things.h"
 #include "flow/scene/placing.h"
 #include "flow/springs/builders.h"
 #include "flow/springs/spring_system.h"
 #include "geometry/base/error.h"
 #include "geometry/base/parallel.h"
-#include "geometry/collide/obstacles.h"
 #include "geometry/mesh/measure.h"
 
 namespace effuse::flow {
@@ -58,12 +59,7 @@ struct SpringsSettings {
 class SpringsEffect final : public Effect {
  public:
   SpringsEffect(const SpringsSettings& settings, const World& world, SpringBody body)
-      : settings_(settings), terrain_(world.terrain), body_(std::move(body)), state_(body_.state) {
-    if (world.obstacles && settings.meets)
-      for (const PlacedObstacle& each : *world.obstacles) {
-        obstacles_.add({each.shape, geometry::RigidMotion{each.track.at(0), each.track.at(0), 1}, each.temperature, static_cast<Index>(obstacles_.size() + 1)});
-        tracks_.push_back(each.track);
-      }
+      : settings_(settings), terrain_(world.terrain), body_(std::move(body)), state_(body_.state), things_(settings.meets ? world : World{}) {
     for (const auto& each : world.obstacles ? *world.obstacles : std::vector<PlacedObstacle>())
       if (each.name == settings.pinned_to) driver_ = each.track;
     for (std::size_t i = 0; i < state_.x.size(); ++i)
@@ -74,6 +70,7 @@ class SpringsEffect final : public Effect {
   }
 
   std::string_view name() const override { return settings_.name; }
+  void meet(const std::vector<Effect*>& others) override { things_.meet(others); }
   Real time() const override { return time_; }
 
   void step(Real t_end) override {
@@ -135,6 +132,7 @@ class SpringsEffect final : public Effect {
     out.array("x", state_.x);
     out.array("v", state_.v);
     out.array("torn", torn_);
+    things_.save(out);
   }
   void load(StateReader& in) override {
     SpringState state;
@@ -144,6 +142,7 @@ class SpringsEffect final : public Effect {
     in.array("x", state.x);
     in.array("v", state.v);
     in.array("torn", torn_);
+    things_.load(in);
     if (state.x.size() != state_.x.size() || state.v.size() != state_.v.size()) throw InputError(Place{"checkpoint"}, fmt::format("springs '{}': holds {} points, the scene's have {}", settings_.name, state.x.size(), state_.x.size()));
     state_ = std::move(state);
     std::erase_if(body_.network.springs, [&](const springs::Spring& s) { return std::binary_search(torn_.begin(), torn_.end(), pair_of(s.a, s.b)); });
@@ -195,23 +194,8 @@ class SpringsEffect final : public Effect {
     const Real fastest = parallel_max(state_.v.size(), 0.0, [&](std::size_t i) { return state_.v[i].norm(); });
     // As far as a point may move, and as deep as it may have sunk: solids of meshes are felt within reach only.
     const Real reach = settings_.thickness + 2 * fastest * dt + mean_rest_ / 2;
-    const auto take = [&](std::size_t i, const geometry::Contact& c) {
-      contacts.push_back({static_cast<Index>(i), Vec3(state_.x[i] + (settings_.thickness - c.distance) * c.normal), c.normal, c.surface_velocity});
-    };
-    if (terrain_) {
-      found_.resize(state_.x.size());
-      terrain_->contacts(state_.x, reach, found_);
-      for (std::size_t i = 0; i < found_.size(); ++i)
-        if (found_[i].any()) take(i, found_[i]);
-    }
-    if (tracks_.empty()) return;
-    for (std::size_t k = 0; k < tracks_.size(); ++k) obstacles_.move(k, {tracks_[k].at(time_), tracks_[k].at(time_ + dt), dt});
-    obstacles_.update();
-    constexpr int kPerPoint = 3;
-    found_.resize(kPerPoint * state_.x.size());
-    obstacles_.contacts(state_.x, reach, kPerPoint, found_);
-    for (std::size_t q = 0; q < found_.size(); ++q)
-      if (found_[q].any()) take(q / kPerPoint, found_[q]);
+    things_.move(time_, dt);
+    things_.add_planes(terrain_, state_.x, reach, settings_.thickness, contacts);
   }
 
   std::size_t tear_now() {
@@ -235,19 +219,12 @@ class SpringsEffect final : public Effect {
   std::vector<Vec3> start_;
   StepStorage<SpringState> storage_;
   std::unique_ptr<SpringSystem> system_;
-  geometry::Obstacles obstacles_;
-  std::vector<geometry::PoseTrack> tracks_;
+  MetThings things_;
   std::optional<geometry::PoseTrack> driver_;
-  std::vector<geometry::Contact> found_;
   std::vector<std::uint64_t> torn_;
   Real time_ = 0, limit_ = 0, own_step_ = 0, mean_rest_ = 0;
   std::uint64_t steps_ = 0, retries_ = 0;
 };
-
-Vec3 vector(Parameters& p, const char* key, const char* unit, const Vec3& usual, const char* what) {
-  const std::vector<Real> v = p.numbers(key, unit, 3, false, what);
-  return v.size() == 3 ? Vec3(v[0], v[1], v[2]) : usual;
-}
 
 SpringsSettings read(Parameters& p) {
   SpringsSettings s;
@@ -257,14 +234,14 @@ SpringsSettings read(Parameters& p) {
     s.name = p.text("name", "springs", "for files");
     s.points = static_cast<int>(p.integer("points", s.points, 2, 60, "a side"));
     s.size = p.number("size", "m", s.size, Parameters::positive(), "of its sides at rest");
-    s.color = vector(p, "color", "", s.color, "red, green and blue, 0 to 1 (sRGB)");
+    s.color = read_vector(p, "color", "", s.color, "red, green and blue, 0 to 1 (sRGB)");
   } else {
     read_form(p, "mesh, relative to the scene file", s.form);
     s.name = s.form.name;
     s.color = s.form.color;
     if (s.shape == Shape::kSolid) s.spacing = p.number("spacing", "m", std::nullopt, Parameters::positive(), "of its points");
   }
-  if (s.name.empty() || s.name.find_first_of("/\\\n") != std::string::npos) p.fault("name", fmt::format("'{}' cannot be part of a file's name", s.name));
+  check_effect_name(p, s.name);
   s.mass = p.number("mass", "kg", 0, Parameters::not_negative(), "in all; or density");
   s.density = p.number("density", s.shape == Shape::kCloth ? "kg/m2" : "kg/m3", 0, Parameters::not_negative(), "of the solid, or of a cloth's area; or mass");
   if ((s.mass > 0) == (s.density > 0)) p.fault(s.mass > 0 ? "mass" : "density", s.mass > 0 ? "found with density, wanted one of the two" : "is missing, wanted density or mass above 0");
@@ -278,16 +255,16 @@ SpringsSettings read(Parameters& p) {
   }
   s.pose = read_pose(p, false, {});
   s.on_ground = p.flag("on_ground", false, "its height counts from the terrain at x, y");
-  s.velocity = vector(p, "velocity", "m/s", s.velocity, "at the start");
-  s.spin = vector(p, "spin", "rad/s", s.spin, "at the start, about its position");
+  s.velocity = read_vector(p, "velocity", "m/s", s.velocity, "at the start");
+  s.spin = read_vector(p, "spin", "rad/s", s.spin, "at the start, about its position");
   for (const std::vector<Real>& pin : p.number_lists("pins", "m", 4, false, "[x, y, z, radius]: points that start this near are held"))
     s.pins.push_back({Vec3(pin[0], pin[1], pin[2]), pin[3]});
   s.pinned_to = p.text("pinned_to", "", "obstacle that carries the held points");
   for (const std::vector<Real>& x : p.number_lists("positions", "m", 3, false, "of every point at the start, instead of rest")) s.positions.push_back(Vec3(x[0], x[1], x[2]));
   for (const std::vector<Real>& v : p.number_lists("velocities", "m/s", 3, false, "of every point at the start")) s.velocities.push_back(Vec3(v[0], v[1], v[2]));
-  s.around.gravity = vector(p, "gravity", "m/s2", Vec3(0, 0, -kGravity), "");
+  s.around.gravity = read_vector(p, "gravity", "m/s2", Vec3(0, 0, -kGravity), "");
   s.around.drag = p.number("drag", "1/s", 0, Parameters::not_negative(), "of the air, per mass");
-  s.around.wind = vector(p, "wind", "m/s", s.around.wind, "");
+  s.around.wind = read_vector(p, "wind", "m/s", s.around.wind, "");
   for (const std::vector<Real>& w : p.number_lists("walls", "", 4, false, "[a, b, c, d]: penalty walls that keep a x + b y + c z + d >= 0")) {
     const Real length = Vec3(w[0], w[1], w[2]).norm();
     if (!(length > 0)) p.fault("walls", "has one whose a, b and c are all 0, so it has no normal");
@@ -300,8 +277,8 @@ SpringsSettings read(Parameters& p) {
   s.thickness = p.number("thickness", "m", 0, Parameters::not_negative(), "that it keeps from ground and obstacles");
   if (p.has("force_field")) {
     Parameters f = p.table("force_field", "forces on its points, trilinear on a grid, outside as at its border");
-    s.field.low = vector(f, "low", "m", s.field.low, "corner of the grid");
-    s.field.high = vector(f, "high", "m", s.field.high, "opposite corner");
+    s.field.low = read_vector(f, "low", "m", s.field.low, "corner of the grid");
+    s.field.high = read_vector(f, "high", "m", s.field.high, "opposite corner");
     s.field.resolution = static_cast<int>(f.integer("resolution", std::nullopt, 2, 512, "corners a side"));
     for (const std::vector<Real>& v : f.number_lists("values", "N", 3, true, "corner (i, j, k) with k fastest")) s.field.values.push_back(Vec3(v[0], v[1], v[2]));
     const auto r = static_cast<std::size_t>(s.field.resolution);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 #include <tuple>
+#include <unordered_set>
 #include <utility>
 
 #include "geometry/base/check.h"
@@ -53,12 +54,11 @@ struct Parameters::Shared {
   std::unique_ptr<Table> root;
   std::vector<Fault> faults;
   std::vector<ParameterDoc> docs;
+  std::unordered_set<std::string> documented, asked;
 
-  void document(const std::string& path, std::string unit, std::string default_value, std::string_view what) {
+  void document(ParameterDoc doc) {
     // The tables of an array share their documentation.
-    for (const ParameterDoc& known : docs)
-      if (known.path == path) return;
-    docs.push_back({path, std::move(unit), std::move(default_value), std::string(what)});
+    if (documented.insert(doc.path).second) docs.push_back(std::move(doc));
   }
 };
 
@@ -145,6 +145,11 @@ Node text_node(std::string text, const Place& place) {
   return node;
 }
 
+ParameterDoc number_doc(std::string path, ParameterDoc::Kind kind, std::string_view unit, std::optional<Real> fallback, const Parameters::Range& range, std::string_view what) {
+  const std::string si(plain(unit) ? "" : unit);
+  return {std::move(path), si, fallback ? format_quantity(*fallback, si) : "", std::string(what), kind, si, range.low, range.high, range.open_low};
+}
+
 std::string list(const std::vector<std::string>& names, std::string_view between) { return fmt::format("{}", fmt::join(names, between)); }
 
 /// "; did you mean 'rate'?", or the names there are.
@@ -176,7 +181,10 @@ Parameters::Parameters(const Node& root) : shared_(std::make_shared<Shared>()) {
 Parameters::Parameters(std::shared_ptr<Shared> shared, Table* table, std::string path)
     : shared_(std::move(shared)), table_(table), path_(std::move(path)) {}
 
-bool Parameters::has(const std::string& key) const { return table_->node && table_->node->find(key); }
+bool Parameters::has(const std::string& key) const {
+  shared_->asked.insert(joined(table_->doc_path, key));
+  return table_->node && table_->node->find(key);
+}
 
 Place Parameters::place(const std::string& key) const {
   const Node* node = table_->node ? table_->node->find(key) : nullptr;
@@ -192,8 +200,7 @@ void Parameters::fault_at(const Place& place, const std::string& message) { shar
 
 Real Parameters::number(const std::string& key, std::string_view unit, std::optional<Real> fallback, Range range, std::string_view what) {
   Table::Entry& entry = table_->entry(key);
-  shared_->document(joined(table_->doc_path, key), plain(unit) ? "" : std::string(unit),
-                    fallback ? format_quantity(*fallback, plain(unit) ? "" : unit) : "", what);
+  shared_->document(number_doc(joined(table_->doc_path, key), ParameterDoc::Kind::kNumber, unit, fallback, range, what));
   const Node* node = table_->node ? table_->node->find(key) : nullptr;
   Real value = fallback.value_or(0);
   if (node) {
@@ -217,7 +224,10 @@ Real Parameters::number(const std::string& key, std::string_view unit, std::opti
 std::int64_t Parameters::integer(const std::string& key, std::optional<std::int64_t> fallback, std::int64_t low, std::int64_t high,
                                  std::string_view what) {
   Table::Entry& entry = table_->entry(key);
-  shared_->document(joined(table_->doc_path, key), "whole number", fallback ? fmt::format("{}", *fallback) : "", what);
+  ParameterDoc doc{joined(table_->doc_path, key), "whole number", fallback ? fmt::format("{}", *fallback) : "", std::string(what), ParameterDoc::Kind::kInteger};
+  if (low != std::numeric_limits<std::int64_t>::min()) doc.low = static_cast<Real>(low);
+  if (high != std::numeric_limits<std::int64_t>::max()) doc.high = static_cast<Real>(high);
+  shared_->document(std::move(doc));
   const Node* node = table_->node ? table_->node->find(key) : nullptr;
   std::int64_t value = fallback.value_or(0);
   if (node) {
@@ -249,7 +259,7 @@ std::int64_t Parameters::integer(const std::string& key, std::optional<std::int6
 
 bool Parameters::flag(const std::string& key, bool fallback, std::string_view what) {
   Table::Entry& entry = table_->entry(key);
-  shared_->document(joined(table_->doc_path, key), "flag", fallback ? "true" : "false", what);
+  shared_->document({joined(table_->doc_path, key), "flag", fallback ? "true" : "false", std::string(what), ParameterDoc::Kind::kFlag});
   bool value = fallback;
   if (const Node* node = table_->node ? table_->node->find(key) : nullptr) {
     if (node->kind == Node::Kind::kFlag) {
@@ -268,7 +278,7 @@ bool Parameters::flag(const std::string& key, bool fallback, std::string_view wh
 
 std::string Parameters::text(const std::string& key, std::optional<std::string> fallback, std::string_view what) {
   Table::Entry& entry = table_->entry(key);
-  shared_->document(joined(table_->doc_path, key), "text", !fallback ? "" : fallback->empty() ? "\"\"" : *fallback, what);
+  shared_->document({joined(table_->doc_path, key), "text", !fallback ? "" : fallback->empty() ? "\"\"" : *fallback, std::string(what), ParameterDoc::Kind::kText});
   std::string value = fallback.value_or("");
   if (const Node* node = table_->node ? table_->node->find(key) : nullptr) {
     if (node->kind == Node::Kind::kText) {
@@ -286,7 +296,9 @@ std::string Parameters::text(const std::string& key, std::optional<std::string> 
 std::vector<std::string> Parameters::texts(const std::string& key, std::size_t count, std::string_view what) {
   Table::Entry& entry = table_->entry(key);
   const std::string wanted = fmt::format("an array of {} texts in quotes", count);
-  shared_->document(joined(table_->doc_path, key), wanted, "", what);
+  ParameterDoc doc{joined(table_->doc_path, key), wanted, "", std::string(what), ParameterDoc::Kind::kTexts};
+  doc.count = count;
+  shared_->document(std::move(doc));
   const Node* node = table_->node ? table_->node->find(key) : nullptr;
   if (!node) {
     fault(key, fmt::format("is missing ({}), wanted {}", what, wanted));
@@ -310,7 +322,7 @@ std::vector<std::string> Parameters::texts(const std::string& key, std::size_t c
 
 std::vector<std::string> Parameters::texts(const std::string& key, std::string_view what) {
   Table::Entry& entry = table_->entry(key);
-  shared_->document(joined(table_->doc_path, key), "text, or several: [\"a\", \"b\"]", "", what);
+  shared_->document({joined(table_->doc_path, key), "text, or several: [\"a\", \"b\"]", "", std::string(what), ParameterDoc::Kind::kTextOrTexts});
   const Node* node = table_->node ? table_->node->find(key) : nullptr;
   if (!node) {
     fault(key, fmt::format("is missing ({}), wanted text in quotes", what));
@@ -330,7 +342,9 @@ std::vector<std::string> Parameters::texts(const std::string& key, std::string_v
 std::size_t Parameters::choice(const std::string& key, const std::vector<std::string>& names, std::size_t fallback, std::string_view what) {
   CHECK_LT(fallback, names.size());
   Table::Entry& entry = table_->entry(key);
-  shared_->document(joined(table_->doc_path, key), "choice: " + list(names, " | "), names[fallback], what);
+  ParameterDoc doc{joined(table_->doc_path, key), "choice: " + list(names, " | "), names[fallback], std::string(what), ParameterDoc::Kind::kChoice};
+  doc.names = names;
+  shared_->document(std::move(doc));
   std::size_t value = fallback;
   if (const Node* node = table_->node ? table_->node->find(key) : nullptr) {
     if (node->kind != Node::Kind::kText) {
@@ -351,7 +365,9 @@ std::vector<std::size_t> Parameters::choices(const std::string& key, const std::
   Table::Entry& entry = table_->entry(key);
   std::vector<std::string> defaults;
   for (std::size_t index : fallback) defaults.push_back(names[index]);
-  shared_->document(joined(table_->doc_path, key), "choices: " + list(names, " | "), "[" + list(defaults, ", ") + "]", what);
+  ParameterDoc doc{joined(table_->doc_path, key), "choices: " + list(names, " | "), "[" + list(defaults, ", ") + "]", std::string(what), ParameterDoc::Kind::kChoices};
+  doc.names = names;
+  shared_->document(std::move(doc));
 
   std::vector<std::size_t> value = fallback;
   if (const Node* node = table_->node ? table_->node->find(key) : nullptr) {
@@ -426,7 +442,9 @@ Node numbers_node(const std::vector<Real>& values, std::string_view unit, const 
 std::vector<Real> Parameters::numbers(const std::string& key, std::string_view unit, std::size_t count, bool required,
                                       std::string_view what) {
   Table::Entry& entry = table_->entry(key);
-  shared_->document(joined(table_->doc_path, key), wanted_numbers(unit, count), required ? "" : "[]", what);
+  ParameterDoc doc{joined(table_->doc_path, key), wanted_numbers(unit, count), required ? "" : "[]", std::string(what), ParameterDoc::Kind::kNumbers, plain(unit) ? "" : std::string(unit)};
+  doc.count = count;
+  shared_->document(std::move(doc));
   const Node* node = table_->node ? table_->node->find(key) : nullptr;
   if (!node) {
     if (!required) return {};
@@ -443,7 +461,9 @@ std::vector<std::vector<Real>> Parameters::number_lists(const std::string& key, 
                                                         std::string_view what) {
   Table::Entry& entry = table_->entry(key);
   const std::string wanted = "an array of " + wanted_numbers(unit, width).substr(3) + " each";
-  shared_->document(joined(table_->doc_path, key), wanted, required ? "" : "[]", what);
+  ParameterDoc doc{joined(table_->doc_path, key), wanted, required ? "" : "[]", std::string(what), ParameterDoc::Kind::kNumberLists, plain(unit) ? "" : std::string(unit)};
+  doc.count = width;
+  shared_->document(std::move(doc));
   const Node* node = table_->node ? table_->node->find(key) : nullptr;
   if (!node) {
     if (required) fault(key, fmt::format("is missing ({}), wanted {}", what, wanted));
@@ -476,10 +496,10 @@ constexpr std::size_t kSmoothWay = 2, kBezierWay = 4;
 }  // namespace
 
 geometry::Curve<Real> Parameters::curve(const std::string& key, std::string_view unit, std::optional<Real> fallback, Range range, std::string_view what) {
+  shared_->document(number_doc(joined(table_->doc_path, key), ParameterDoc::Kind::kCurve, unit, fallback, range, what));
   const Node* node = table_->node ? table_->node->find(key) : nullptr;
   if (!node || node->kind != Node::Kind::kArray) return geometry::Curve<Real>(number(key, unit, fallback, range, what));
   table_->entry(key);  // its place among the resolved
-  shared_->document(joined(table_->doc_path, key), plain(unit) ? "" : std::string(unit), fallback ? format_quantity(*fallback, plain(unit) ? "" : unit) : "", what);
   const std::size_t usual = choice("motion", {"linear", "hold", "smooth", "catmull_rom"}, 0, "from key to key, of numbers given by keys");
 
   const std::string wanted = fmt::format("keys [[time, {}], ...], the times rising", plain(unit) ? std::string("number") : fmt::format("number in {}", unit));
@@ -552,7 +572,7 @@ geometry::Curve<Real> Parameters::curve(const std::string& key, std::string_view
 Parameters Parameters::table(const std::string& key, std::string_view what) {
   Table::Entry& entry = table_->entry(key);
   const std::string doc_path = joined(table_->doc_path, key);
-  shared_->document(doc_path, "table", "{}", what);
+  shared_->document({doc_path, "table", "{}", std::string(what), ParameterDoc::Kind::kTable});
   if (entry.tables.empty()) {
     auto child = std::make_unique<Table>();
     child->place = place(key);
@@ -571,7 +591,7 @@ Parameters Parameters::table(const std::string& key, std::string_view what) {
 std::vector<Parameters> Parameters::tables(const std::string& key, std::string_view what) {
   Table::Entry& entry = table_->entry(key);
   const std::string doc_path = joined(table_->doc_path, key) + "[]";
-  shared_->document(doc_path, "tables", "[]", what);
+  shared_->document({doc_path, "tables", "[]", std::string(what), ParameterDoc::Kind::kTables});
   const Node* node = table_->node ? table_->node->find(key) : nullptr;
   if (!entry.array) {
     entry.array = true;
@@ -662,5 +682,16 @@ Node Parameters::resolved() const {
 }
 
 std::vector<ParameterDoc> Parameters::docs() const { return shared_->docs; }
+
+std::vector<std::string> Parameters::asked() const {
+  std::vector<std::string> paths(shared_->asked.begin(), shared_->asked.end());
+  std::sort(paths.begin(), paths.end());
+  return paths;
+}
+
+std::string range_of(const ParameterDoc& doc) {
+  const bool all = !std::isfinite(doc.low) && !std::isfinite(doc.high);
+  return all ? std::string() : range_text({doc.low, doc.high, doc.open_low}, doc.si_unit);
+}
 
 }  // namespace effuse::flow

@@ -13,13 +13,24 @@
 
 namespace effuse::flow {
 
-/// What a table of a scene may hold, as found out by reading it: for `effuse effects`.
+/// What a table of a scene may hold, as found out by reading it: for `effuse effects` and the schema.
 struct ParameterDoc {
+  enum class Kind { kNumber, kCurve, kInteger, kFlag, kText, kTexts, kTextOrTexts, kChoice, kChoices, kNumbers, kNumberLists, kTable, kTables };
+
   std::string path;           ///< "lava.vents[].rate"
   std::string unit;           ///< SI unit, "" for plain numbers, "text", "flag", "choice: a | b", ...
   std::string default_value;  ///< "" : required
   std::string what;
+  Kind kind = Kind::kText;
+  std::string si_unit = {};               ///< of numbers, lone or in arrays; "": plain
+  Real low = -std::numeric_limits<Real>::infinity(), high = std::numeric_limits<Real>::infinity();  ///< of numbers and integers
+  bool open_low = false;                  ///< low itself is not allowed
+  std::vector<std::string> names = {};    ///< of choices
+  std::size_t count = 0;                  ///< of an array's entries, of a list's in each array; 0: any number
 };
+
+/// "> 0", ">= 0 K", "from 1 to 5 m"; "" where every number will do.
+std::string range_of(const ParameterDoc& doc);
 
 /// Reads one table of a scene: value by value, each with its unit, range and default. Faults are
 /// gathered, not thrown, so that all of a scene are told at once; keys nobody read are faults, too,
@@ -82,6 +93,8 @@ class Parameters {
   /// All that was read, defaults filled in, in the order of reading.
   Node resolved() const;
   std::vector<ParameterDoc> docs() const;
+  /// Paths, as docs() has them, of the keys that has() was asked for.
+  std::vector<std::string> asked() const;
 
  private:
   struct Shared;

@@ -47,6 +47,7 @@ Scene read_scene(Parameters& root, std::span<const EffectKind> kinds) {
   scene.fps = film.number("fps", "1/s", 24, Parameters::positive(), "frames a second of film");
   scene.time_scale = film.number("time_scale", "", 1, Parameters::positive(), "simulated seconds a second of film: 30 is a time lapse");
 
+  scene.accuracy = read_accuracy(root);
   scene.terrain = read_terrain_settings(root);
 
   scene.obstacles = read_obstacles(root);
@@ -75,17 +76,22 @@ Scene read_scene(Parameters& root, std::span<const EffectKind> kinds) {
       scene.effects.push_back(std::move(plan));
     }
   }
-  if (scene.effects.empty() && !(scene.obstacles.empty() && scene.bodies.empty() && scene.figures.empty())) {
+  // Lava moves bodies with itself. Beside other effects they move before these, which meet them where they are then.
+  const bool lava = std::any_of(scene.effects.begin(), scene.effects.end(), [](const EffectPlan& plan) { return plan.kind == "lava"; });
+  if ((!lava && !scene.bodies.empty()) || (scene.effects.empty() && !(scene.obstacles.empty() && scene.figures.empty()))) {
     const Node nothing;
     Parameters told(nothing);  // its own table has been read
     for (const EffectKind& kind : kinds) {
       if (!kind.of_solids) continue;
-      scene.effects.push_back(kind.read(told, scene.frame_time(scene.frames)));
-      scene.effects.back().kind = kind.name;
-      scene.effects.back().estimate = estimate_bodies(scene.body_settings, scene.bodies.size(), scene.frame_time(scene.frames));
+      EffectPlan plan = kind.read(told, scene.frame_time(scene.frames));
+      plan.kind = kind.name;
+      plan.estimate = estimate_bodies(scene.body_settings, scene.bodies.size(), scene.frame_time(scene.frames));
+      scene.effects.insert(scene.effects.begin(), std::move(plan));
     }
   }
   require_partners(root, scene.effects);
+  if (scene.accuracy && std::none_of(scene.effects.begin(), scene.effects.end(), [](const EffectPlan& plan) { return plan.kind == "lava"; }))
+    root.fault_at(scene.accuracy->place, "is of the lava's front, and the scene has no [lava]");
   if (scene.effects.empty()) {
     std::string names;
     for (const EffectKind& kind : kinds) names += (names.empty() ? "[" : ", [") + (kind.of_solids ? "[body]" : kind.name) + "]";

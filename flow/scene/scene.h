@@ -1,10 +1,12 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "flow/scene/accuracy.h"
 #include "flow/scene/effect.h"
 #include "flow/scene/figures.h"
 #include "flow/scene/joints.h"
@@ -20,6 +22,7 @@ struct Scene {
   int frames = 0;
   Real fps = 24;
   Real time_scale = 1;          ///< simulated seconds a second of film
+  std::optional<AccuracyWish> accuracy;
   TerrainSettings terrain;
   std::vector<PlannedObstacle> obstacles;
   std::vector<PlannedFigure> figures;
@@ -32,8 +35,9 @@ struct Scene {
   Real frame_time(int n) const { return n * time_scale / fps; }
 };
 
-/// Reads the tables [film], [terrain], [[obstacle]], [[figure]], [[body]], [[joint]], [bodies] and one for each effect of kinds that the scene names.
-/// Where it names none, the kind of_solids steps its bodies and obstacles. Faults stay in root: the caller reads on and calls root.finish().
+/// Reads the tables [film], [accuracy], [terrain], [[obstacle]], [[figure]], [[body]], [[joint]], [bodies] and one for each effect of kinds that the scene names.
+/// Where it has bodies and no lava, or nothing but solids, the kind of_solids steps them, before all other effects. Faults stay in root: the
+/// caller reads on and calls root.finish().
 Scene read_scene(Parameters& root, std::span<const EffectKind> kinds);
 
 }  // namespace effuse::flow

@@ -17,7 +17,6 @@ namespace fs = std::filesystem;
 namespace {
 constexpr std::string_view kMagic = "effuse checkpoint 2";
 constexpr std::size_t kHashDigits = 16;  // at the end of a checkpoint, of all before it
-constexpr std::size_t kKeep = 2;  // one to fall back on should the newest be damaged
 
 std::string hash_of(std::string_view bytes) {
   StateHash hash;
@@ -96,14 +95,19 @@ std::string Simulation::checkpoint(const std::string& scene_key) const {
   return out.bytes() + hash_of(out.bytes());
 }
 
-void Simulation::restore(std::string_view bytes, const std::string& scene_key, const std::string& file) {
+void Simulation::restore(std::string_view bytes, const std::string& scene_key, const std::string& file) { load(bytes, &scene_key, file); }
+
+std::string Simulation::branch(std::string_view bytes, const std::string& file) { return load(bytes, nullptr, file); }
+
+std::string Simulation::load(std::string_view bytes, const std::string* scene_key, const std::string& file) {
   StateReader in(bytes, file);
   std::string text;
   in.text("magic", text);
   if (text != kMagic) throw InputError(Place{file}, fmt::format("found '{:.40}', wanted '{}'", text, kMagic));
   if (!undamaged(bytes)) throw InputError(Place{file}, "the checkpoint is damaged: its bytes are not those that were written");
   in.text("scene", text);
-  if (text != scene_key) throw InputError(Place{file}, "the scene has changed since this checkpoint was written; start anew in another folder, or put the scene back");
+  const std::string found_key = text;
+  if (scene_key && text != *scene_key) throw InputError(Place{file}, "the scene has changed since this checkpoint was written; start anew in another folder, or put the scene back");
   int frame = 0;
   std::size_t count = 0;
   in.value("frame", frame);
@@ -116,13 +120,14 @@ void Simulation::restore(std::string_view bytes, const std::string& scene_key, c
   }
   in.text("end", text);
   frame_ = frame;
+  return found_key;
 }
 
-void write_checkpoint(const fs::path& folder, const Simulation& simulation, const std::string& scene_key) {
+void write_checkpoint(const fs::path& folder, const Simulation& simulation, const std::string& scene_key, std::size_t keep) {
   ZONE("checkpoint");
   write_file(folder / "checkpoints" / fmt::format("checkpoint.{:04}.state", simulation.frame()), simulation.checkpoint(scene_key));
   const std::vector<fs::path> all = checkpoints(folder);
-  for (std::size_t i = kKeep; i < all.size(); ++i) {
+  for (std::size_t i = keep; keep > 0 && i < all.size(); ++i) {
     std::error_code ignored;
     fs::remove(all[i], ignored);
   }

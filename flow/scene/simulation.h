@@ -33,15 +33,18 @@ class Simulation {
   std::string checkpoint(const std::string& scene_key) const;
   /// Throws InputError when the bytes are damaged, of another version, another scene_key or other effects.
   void restore(std::string_view bytes, const std::string& scene_key, const std::string& file);
+  /// The same from a checkpoint of other settings, to go on with these; returns the scene_key it has.
+  std::string branch(std::string_view bytes, const std::string& file);
 
  private:
+  std::string load(std::string_view bytes, const std::string* scene_key, const std::string& file);
   const Scene* scene_;
   std::vector<std::unique_ptr<Effect>> effects_;
   int frame_ = 0;
 };
 
-/// DIR/checkpoints/checkpoint.0042.state, whole or absent; keeps the newest two.
-void write_checkpoint(const std::filesystem::path& folder, const Simulation& simulation, const std::string& scene_key);
+/// DIR/checkpoints/checkpoint.0042.state, whole or absent; only the newest `keep` stay, 0: all.
+void write_checkpoint(const std::filesystem::path& folder, const Simulation& simulation, const std::string& scene_key, std::size_t keep = 2);
 /// The checkpoints there are, newest first.
 std::vector<std::filesystem::path> checkpoints(const std::filesystem::path& folder);
 /// Whether the bytes are a checkpoint as it was written, to the last bit.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -30,9 +31,33 @@ struct TerrainSettings {
   enum class Pits { kKeep, kFill, kBreach } pits = Pits::kKeep;
   Real pit_depth = 0;              ///< [m]
   std::vector<Real> size, range;   ///< of images [m]; empty: none
+
+  // Of meshes:
+  enum class Up { kAuto, kX, kY, kZ } up = Up::kAuto;  ///< the file's axis that points up; kAuto: as it says, or z
+  Real metres_per_unit = 0;        ///< of the file's lengths; 0: as it says, or 1
+  bool repair = true;              ///< made sound; else left as it is
+  Real stitch = 0;                 ///< borders no farther apart become one [m]; 0: a millionth of the mesh's size
+  Real fill_holes = 0;             ///< holes up to this diagonal are filled [m]
+  Real max_error = 0;              ///< simplified, no farther from itself than this [m]; 0: not
+  Real edge = 0;                   ///< remeshed to triangles of such edges [m]; 0: not
 };
+
+/// Keys of [terrain] that say something of one kind of ground only. The others go with both.
+inline constexpr std::array kGridKeys = {"file_crs", "spacing", "resample", "vertical_unit", "holes", "pits", "pit_depth", "size", "range"};
+inline constexpr std::array kMeshKeys = {"up", "unit", "repair", "stitch", "fill_holes", "max_error", "edge"};
 
 /// Reads [terrain]. Faults stay in root.
 TerrainSettings read_terrain_settings(Parameters& root);
+
+/// What [terrain] says of its file, into s: all but file, plane and temperature. `effuse import` reads its options so, too.
+void read_terrain_keys(Parameters& terrain, TerrainSettings& s);
+
+/// A fault for each key in the table that is of grids where the file holds a mesh, or the other way round, at the key's place.
+///   path  of the table, for the messages: "terrain"; or ""
+///   file  its name, for the messages
+std::vector<Fault> misfits(const Node& terrain, const std::string& path, bool is_grid, const std::string& file);
+
+/// Takes those keys out of a resolved table, where their defaults stand.
+void drop_misfits(Node& terrain, bool is_grid);
 
 }  // namespace effuse::flow

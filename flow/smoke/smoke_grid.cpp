@@ -155,11 +155,6 @@ void SmokeGrid::carry(std::vector<Real>& values, int stagger, Real dt) {
   const auto point = [&](std::size_t c) { return Vec3(f.offset + Vec3(static_cast<Real>(c % row), static_cast<Real>(c / row % rows), static_cast<Real>(c / (row * rows)))); };
   ahead_.resize(n);
   result_.resize(n);
-  if (!options_.sharp) {
-    parallel_for(n, [&](std::size_t c) { result_[c] = f.at(origin_of(point(c), dt), false).value; }, kGrain);
-    values.swap(result_);
-    return;
-  }
   back_.resize(2 * n);  // the range that a value came from
   parallel_for(n, [&](std::size_t c) {
     const Field::Around from = f.at(origin_of(point(c), dt), true);
@@ -167,12 +162,43 @@ void SmokeGrid::carry(std::vector<Real>& values, int stagger, Real dt) {
     back_[2 * c] = from.low;
     back_[2 * c + 1] = from.high;
   }, kGrain);
-  const Field moved = field(ahead_, stagger);
-  parallel_for(n, [&](std::size_t c) {
-    const Real again = moved.at(origin_of(point(c), -dt), false).value;
-    result_[c] = std::clamp(ahead_[c] + (values[c] - again) / 2, back_[2 * c], back_[2 * c + 1]);
-  }, kGrain);
+  if (options_.sharp) {
+    const Field moved = field(ahead_, stagger);
+    parallel_for(n, [&](std::size_t c) {
+      const Real again = moved.at(origin_of(point(c), -dt), false).value;
+      result_[c] = std::clamp(ahead_[c] + (values[c] - again) / 2, back_[2 * c], back_[2 * c + 1]);
+    }, kGrain);
+  } else {
+    result_.swap(ahead_);
+  }
+  if (stagger < 0) put_back(values, dt);
   values.swap(result_);
+}
+
+/// Share of a cell that stays in the grid as it is moved along its middle's path.
+Real SmokeGrid::staying(std::size_t c, Real dt) const {
+  const Vec3 middle = Vec3(static_cast<Real>(c % nx_), static_cast<Real>(c / nx_ % ny_), static_cast<Real>(c / (nx_ * ny_))) + Vec3::Constant(0.5), to = origin_of(middle, -dt);
+  Real share = 1;
+  for (Eigen::Index a = 0; a < 3; ++a) {
+    const auto side = static_cast<std::size_t>(2 * a);
+    if (options_.open[side]) share *= std::clamp(to[a] + 0.5, 0.0, 1.0);
+    if (options_.open[side + 1]) share *= std::clamp(options_.n[static_cast<std::size_t>(a)] + 0.5 - to[a], 0.0, 1.0);
+  }
+  return share;
+}
+
+/// Paths back do not know of volume: what they lost or made, of that which did not leave, is put back or taken off where the range that
+/// a value came from leaves room, in proportion to it: nothing overshoots.
+void SmokeGrid::put_back(std::span<const Real> before, Real dt) {
+  const std::size_t n = before.size();
+  const Real stayed = parallel_sum(n, 0.0, [&](std::size_t c) { return solid_[c] || before[c] == 0 ? 0 : before[c] * staying(c, dt); });
+  const Real now = parallel_sum(n, 0.0, [&](std::size_t c) { return solid_[c] ? 0 : result_[c]; });
+  const Real gap = stayed - now;
+  const auto room = [&](std::size_t c) { return solid_[c] ? 0 : gap > 0 ? back_[2 * c + 1] - result_[c] : back_[2 * c] - result_[c]; };
+  const Real all = parallel_sum(n, 0.0, room);
+  if (!(std::abs(all) > 0)) return;
+  const Real share = std::min(gap / all, 1.0);
+  parallel_for(n, [&](std::size_t c) { result_[c] += share * room(c); }, kGrain);
 }
 
 /// Buoyancy, on the faces between two cells.

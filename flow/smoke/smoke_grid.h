@@ -43,8 +43,9 @@ struct SmokeSource {
 /// A step: everything is carried along the flow's paths back from where it is (semi-Lagrangian, paths by midpoint), with MacCormack's
 /// correction held within the values that it came from; then forces; then projection. Stable at any dt; paths longer than
 /// some cells are dull. What comes in through open sides is clear, and as cool as the air. Cells may be solid: nothing flows through their
-/// faces. Smoke is not conserved: a closed room of 20^3 cells that heat stirs
-/// lost 16 % in a hundred steps. The same bits on any number of threads.
+/// faces. What paths back lose or make of smoke and heat (a sixth in a hundred steps of a closed room that heat stirs) is made good over the
+/// whole grid, within the values that each cell's came from: a closed room keeps both to rounding; through open sides goes what the cells beside
+/// them carry out, to first order. The same bits on any number of threads.
 /// Sources: Stam 1999, SIGGRAPH, 121-128; Fedkiw, Stam & Jensen 2001, SIGGRAPH, 15-22; Selle, Fedkiw, Kim, Liu & Rossignac 2008, J. Sci. Comput. 35, 350-371.
 class SmokeGrid {
  public:
@@ -94,6 +95,8 @@ class SmokeGrid {
   Vec3 air_at(const Vec3& g) const;
   Vec3 origin_of(const Vec3& g, Real dt) const;
   void carry(std::vector<Real>& values, int stagger, Real dt);
+  Real staying(std::size_t cell, Real dt) const;
+  void put_back(std::span<const Real> before, Real dt);
   void push(Real dt);
   void swirl(Real dt);
   void close_faces();

@@ -17,6 +17,7 @@
 #include "geometry/base/check.h"
 #include "geometry/base/error.h"
 #include "geometry/base/parallel.h"
+#include "geometry/base/unstable_at.h"
 #include "geometry/base/zones.h"
 
 namespace effuse::flow::sph {
@@ -303,20 +304,21 @@ struct ModernLava::Impl {
     if (o.period.isZero()) solids.part(lx, walls, neighbors);
   }
 
-  /// "; particle 17 at (1, 2, 3) has a velocity that is no number": the first whose state went bad, or the fastest of the last try.
-  std::string worst_particle(Real dt) const {
+  /// Ends the step, for good: "...; particle 17 at (1, 2, 3) has a velocity that is no number": the first whose state went bad, or the
+  /// fastest of the last try.
+  [[noreturn]] void give_up(const std::string& message, Real dt) const {
     std::size_t worst = 0;
     Real most = -1;
     for (std::size_t k = 0; k < set.awake; ++k) {
       const Index i = set.particles[k];
       const char* bad = !x[i].allFinite() ? "position" : !start[k].allFinite() ? "velocity" : !std::isfinite(q[i]) ? "pressure" : !std::isfinite(mu[i]) ? "viscosity" : nullptr;
-      if (bad) return fmt::format("; particle {} at ({:.6g}, {:.6g}, {:.6g}) has a {} that is no number", census.ids()[i], x[i].x(), x[i].y(), x[i].z(), bad);
+      if (bad) throw UnstableAt(message + fmt::format("; particle {} at ({:.6g}, {:.6g}, {:.6g}) has a {} that is no number", census.ids()[i], x[i].x(), x[i].y(), x[i].z(), bad), x[i]);
       const Real path = (dt * lv[k]).norm();
       if (path > most) most = path, worst = k;
     }
-    if (most < 0) return "";
+    if (most < 0) throw UnstableError(message);
     const Index i = set.particles[worst];
-    return fmt::format("; particle {} at ({:.6g}, {:.6g}, {:.6g}) would go {:.3g} spacings", census.ids()[i], x[i].x(), x[i].y(), x[i].z(), most / o.spacing);
+    throw UnstableAt(message + fmt::format("; particle {} at ({:.6g}, {:.6g}, {:.6g}) would go {:.3g} spacings", census.ids()[i], x[i].x(), x[i].y(), x[i].z(), most / o.spacing), x[i]);
   }
 
   /// Everything that depends on positions alone.
@@ -575,7 +577,7 @@ struct ModernLava::Impl {
     for (;; ++report.retries, dt /= 2) {
       if (try_step(dt, report)) break;
       if (report.retries == kMaxRetries || dt / 2 < o.min_step)
-        throw UnstableError(fmt::format("the step at t = {:.6g} s stayed unstable down to dt = {:.3g} s ({} particles){}", time, dt, size(), worst_particle(dt)));
+        give_up(fmt::format("the step at t = {:.6g} s stayed unstable down to dt = {:.3g} s ({} particles)", time, dt, size()), dt);
       emitter.carry(time, dt / 2, v);
       parallel_for(m, [&](std::size_t k) { start[k] = v[set.particles[k]]; }, 2048);
     }

@@ -15,6 +15,8 @@ namespace effuse::flow::sph {
 ///   (D v)_i = V sum_j (v_i - v_j) . grad W_ij  +  2 slope_i n . (v_i - v_wall)
 ///
 /// the exact rate of the density summed over neighbours; beyond a wall the fluid moves as the mirror image.
+/// Of a linear v it is -tr(grad v) on a lattice; in disorder -V sum F d d^T is not quite unity, and the shear rate adds its share: a flow
+/// that is made to fulfil D v = 0 is dragged harder by that. Small bodies feel it most (solids.h).
 void compression_rate(const ParticleSystem& system, std::span<const Vec3> v, std::span<Real> out);
 
 /// Walls that mirror (Wall::mirrors) have their mirror image counted in full: what flows along them counts for the lava's half of the

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cstdio>
 #include <cstdlib>
 
@@ -54,6 +55,11 @@ std::size_t edit_distance(const std::string& a, const std::string& b) {
 InputError::InputError(std::vector<Fault> faults) : std::runtime_error(join(faults)), faults_(std::move(faults)) {}
 
 std::string nearest_name(const std::string& word, const std::vector<std::string>& candidates) {
+  // What differs in case only is meant, whatever else is as near: 'Z' is no 'x'.
+  const auto same_letters = [&](const std::string& name) {
+    return std::equal(name.begin(), name.end(), word.begin(), word.end(), [](char a, char b) { return std::tolower(static_cast<unsigned char>(a)) == std::tolower(static_cast<unsigned char>(b)); });
+  };
+  if (const auto same = std::find_if(candidates.begin(), candidates.end(), same_letters); same != candidates.end()) return *same;
   std::string best;
   std::size_t best_distance = ~std::size_t{0};
   for (const std::string& candidate : candidates) {

@@ -4,7 +4,10 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <chrono>
+#include <cstdint>
 #include <cstring>
 
 #include "geometry/base/error.h"
@@ -30,14 +33,61 @@ struct Descriptor {
     if (fd >= 0) ::close(fd);
   }
 };
+
+/// The folder of path, made if it is not there.
+fs::path make_folder_of(const fs::path& path) {
+  std::error_code error;
+  if (path.has_parent_path()) fs::create_directories(path.parent_path(), error);
+  if (error) fail(path, "create its folder", error.value());
+  const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+  if (::access(folder.c_str(), W_OK) != 0) fail(path, "write", errno);
+  return folder;
+}
+
+/// A name beside path that nobody else uses: two that write one path must not write one file. `what`: any address of the caller's.
+fs::path name_beside(const fs::path& path, const void* what) {
+  const auto now = std::chrono::steady_clock::now().time_since_epoch().count();
+  std::string stem = path.stem().string();
+  stem.resize(std::min<std::size_t>(stem.size(), 180));  // a name of 255 bytes is the longest there is
+  return path.parent_path() / fmt::format("{}.{:x}{:x}{:x}.part{}", stem, ::getpid(), static_cast<std::uint64_t>(now), reinterpret_cast<std::uintptr_t>(what) >> 4 & 0xffff, path.extension().string());
+}
+
+void write_all(const fs::path& path, int fd, std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(fd, bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) fail(path, "write", errno);
+    bytes.remove_prefix(static_cast<std::size_t>(written));
+  }
+}
+
+/// Without a name until it is whole, so that nothing is left of it whatever ends the process. false: this file system, or this
+/// kernel, has no such files.
+bool write_unnamed(const fs::path& path, const fs::path& folder, std::string_view bytes) {
+#ifdef O_TMPFILE
+  const Descriptor out{::open(folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0644)};
+  if (out.fd < 0) return false;
+  write_all(path, out.fd, bytes);
+  if (::fsync(out.fd) != 0) fail(path, "write", errno);
+  const std::string self = fmt::format("/proc/self/fd/{}", out.fd);
+  if (::linkat(AT_FDCWD, self.c_str(), AT_FDCWD, path.c_str(), AT_SYMLINK_FOLLOW) == 0) return true;
+  if (errno != EEXIST) return false;
+  // A link does not replace what is there, a rename does.
+  const fs::path beside = name_beside(path, &out);
+  if (::linkat(AT_FDCWD, self.c_str(), AT_FDCWD, beside.c_str(), AT_SYMLINK_FOLLOW) != 0) return false;
+  if (::rename(beside.c_str(), path.c_str()) == 0) return true;
+  const int error = errno;
+  ::unlink(beside.c_str());
+  fail(path, "rename to", error);
+#else
+  return false;
+#endif
+}
 }  // namespace
 
 AtomicFile::AtomicFile(fs::path path) : path_(std::move(path)) {
-  std::error_code error;
-  if (path_.has_parent_path()) fs::create_directories(path_.parent_path(), error);
-  if (error) fail(path_, "create the folder of", error.value());
-  if (::access(path_.has_parent_path() ? path_.parent_path().c_str() : ".", W_OK) != 0) fail(path_, "write", errno);
-  temporary_ = path_.parent_path() / (path_.stem().string() + ".part" + path_.extension().string());
+  make_folder_of(path_);
+  temporary_ = name_beside(path_, this);
 }
 
 AtomicFile::~AtomicFile() {
@@ -54,16 +104,12 @@ void AtomicFile::commit() {
 }
 
 void write_file(const fs::path& path, std::string_view bytes) {
+  if (write_unnamed(path, make_folder_of(path), bytes)) return;
   AtomicFile file(path);
   {
     const Descriptor out{::open(file.temporary().c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644)};
     if (out.fd < 0) fail(path, "write", errno);
-    while (!bytes.empty()) {
-      const ssize_t written = ::write(out.fd, bytes.data(), bytes.size());
-      if (written < 0 && errno == EINTR) continue;
-      if (written < 0) fail(path, "write", errno);
-      bytes.remove_prefix(static_cast<std::size_t>(written));
-    }
+    write_all(path, out.fd, bytes);
   }
   file.commit();
 }

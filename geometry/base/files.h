@@ -7,13 +7,13 @@
 /// Files that are whole or absent.
 namespace effuse {
 
-/// Writes path whole or not at all: a temporary file beside it, fsync, rename. Creates the folder.
-/// Throws ResourceError when the disk is full, std::runtime_error with the system's words otherwise.
+/// Writes path whole or not at all: a file without a name where there are such (Linux), fsync, then its name; several may write the same
+/// path at once. Creates the folder. Throws ResourceError when the disk is full, std::runtime_error with the system's words otherwise.
 void write_file(const std::filesystem::path& path, std::string_view bytes);
 
 /// For packages that write to a path themselves (OpenVDB, assimp): give them temporary(), then
-/// commit(). Without commit the temporary file is removed. Temporary names end in ".part" before
-/// the extension of path, so that writers which look at the extension see the right one.
+/// commit(). Without commit the temporary file is removed. Temporary names are of one process and AtomicFile, and end in ".part"
+/// before the extension of path, so that writers which look at the extension see the right one.
 class AtomicFile {
  public:
   explicit AtomicFile(std::filesystem::path path);

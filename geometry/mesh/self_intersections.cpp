@@ -45,6 +45,8 @@ class Box {
   Index triangle_ = 0;
 };
 
+struct Enough {};  // ends a search
+
 class Meeting {
  public:
   explicit Meeting(const TriMesh& mesh) : mesh_(mesh), first_(first_coincident(mesh.positions)) {}
@@ -101,7 +103,7 @@ class Meeting {
 
 }  // namespace
 
-std::vector<std::array<Index, 2>> self_intersections(const TriMesh& mesh) {
+std::vector<std::array<Index, 2>> self_intersections(const TriMesh& mesh, std::size_t at_most) {
   ZONE("mesh.self_intersections");
   for (const Vec3& x : mesh.positions) CHECK(x.allFinite());
   for (const Triangle& t : mesh.triangles)
@@ -112,17 +114,27 @@ std::vector<std::array<Index, 2>> self_intersections(const TriMesh& mesh) {
     boxes.reserve(mesh.triangles.size());
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
       if (!meeting.degenerate(static_cast<Index>(t))) boxes.emplace_back(mesh, static_cast<Index>(t));
-    std::vector<std::array<Index, 2>> pairs;
-    CGAL::box_self_intersection_d(boxes.begin(), boxes.end(), [&](const Box& a, const Box& b) {
-      pairs.push_back({std::min(a.triangle(), b.triangle()), std::max(a.triangle(), b.triangle())});
-    });
-    std::vector<std::uint8_t> meets(pairs.size());
-    parallel_for(
-        pairs.size(), [&](std::size_t k) { meets[k] = meeting(pairs[k][0], pairs[k][1]); }, 4096);
-    std::size_t kept = 0;
-    for (std::size_t k = 0; k < pairs.size(); ++k)
-      if (meets[k]) pairs[kept++] = pairs[k];
-    pairs.resize(kept);
+    // Pairs whose boxes overlap, looked at so many at a time: there may be more than memory holds.
+    constexpr std::size_t kAtOnce = 1 << 20;
+    std::vector<std::array<Index, 2>> pairs, near;
+    std::vector<std::uint8_t> meets;
+    const auto look = [&] {
+      meets.assign(near.size(), 0);
+      parallel_for(
+          near.size(), [&](std::size_t k) { meets[k] = meeting(near[k][0], near[k][1]); }, 4096);
+      for (std::size_t k = 0; k < near.size() && pairs.size() < at_most; ++k)
+        if (meets[k]) pairs.push_back(near[k]);
+      near.clear();
+      if (pairs.size() >= at_most) throw Enough{};
+    };
+    try {
+      CGAL::box_self_intersection_d(boxes.begin(), boxes.end(), [&](const Box& a, const Box& b) {
+        near.push_back({std::min(a.triangle(), b.triangle()), std::max(a.triangle(), b.triangle())});
+        if (near.size() == kAtOnce) look();
+      });
+      look();
+    } catch (const Enough&) {
+    }
     std::sort(pairs.begin(), pairs.end());
     return pairs;
   } catch (const std::logic_error& error) {

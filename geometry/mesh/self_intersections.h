@@ -1,6 +1,8 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "geometry/mesh/tri_mesh.h"
@@ -19,6 +21,8 @@ namespace effuse::geometry {
 /// Triangles without area are left out (validate() counts them).
 /// Indices must be in range, positions finite (checked). O(n log n + pairs whose boxes overlap); 100 bytes a triangle and 8
 /// a pair. The same pairs on any number of threads.
-std::vector<std::array<Index, 2>> self_intersections(const TriMesh& mesh);
+///
+/// at_most: of n triangles in one place there are n^2 / 2 pairs; the search ends when it has found so many, which are then any.
+std::vector<std::array<Index, 2>> self_intersections(const TriMesh& mesh, std::size_t at_most = std::numeric_limits<std::size_t>::max());
 
 }  // namespace effuse::geometry

@@ -16,10 +16,10 @@ Vec3 rotation_vector(const Quat& q) {
 }
 
 Quat rotation_by(const Vec3& axis_angle) {
-  const Real angle = axis_angle.norm();
-  const Real k = angle < 1e-9 ? 0.5 : std::sin(angle / 2) / angle;
-  const Vec3 v = k * axis_angle;
-  return Quat(std::cos(angle / 2), v.x(), v.y(), v.z());
+  const Real half = axis_angle.norm() / 2;
+  // sin(half) / (2 half): its series where the quotient would lose digits.
+  const Real s = half > 1e-4 ? std::sin(half) / (2 * half) : (1 - half * half / 6) / 2;
+  return Quat(std::cos(half), s * axis_angle.x(), s * axis_angle.y(), s * axis_angle.z());
 }
 
 PoseTrack::PoseTrack(std::vector<PoseKey> keys, KeyMotion motion) : keys_(std::move(keys)), motion_(motion) {

@@ -10,6 +10,7 @@
 #include "geometry/base/zones.h"
 #include "geometry/mesh/measure.h"
 #include "geometry/remesh/cgal_mesh_internal.h"
+#include "geometry/remesh/cut_triangles.h"
 
 namespace effuse::geometry {
 
@@ -20,9 +21,16 @@ Remeshed remesh(const TriMesh& mesh, Real edge) {
   CHECK(std::isfinite(edge) && edge > 0);
   const Real expected = surface_area(mesh) / (std::sqrt(3.0) / 4 * edge * edge);
   if (expected > static_cast<Real>(kMostTriangles)) throw InputError(Place{}, fmt::format("edges of {:g} m would make about {:.3g} triangles, at most {} will do", edge, expected, kMostTriangles));
+  // Slivers have next to no area, and edges that are cut all the same.
+  Real length = 0;
+  for (const Triangle& t : mesh.triangles)
+    for (std::size_t k = 0; k < 3; ++k) length += (mesh.positions[t[k]] - mesh.positions[t[(k + 1) % 3]]).norm() / 2;
+  if (length / edge > static_cast<Real>(kMostTriangles)) throw InputError(Place{}, fmt::format("edges of {:g} m would cut those there are into about {:.3g}, at most {} will do", edge, length / edge, kMostTriangles));
   Remeshed result;
   const Vec3 middle = bounds(mesh).center();
-  CgalMesh surface = to_cgal_mesh(mesh, middle);
+  // Where one edge is cut into hundreds CGAL hangs hundreds of triangles on one corner, and takes the square of the time.
+  constexpr Real kLarge = 5;  // [edge^2], ten triangles
+  CgalMesh surface = to_cgal_mesh(cut_triangles(mesh, kLarge * edge * edge), middle);
   cgal_or_error("remeshed", [&] {
     auto kept = surface.add_property_map<CgalMesh::Edge_index, bool>("e:kept", false).first;
     PMP::detect_sharp_edges(surface, kSharp * 180 / kPi, kept);

@@ -13,6 +13,7 @@
 #include "geometry/query/closest_point.h"
 #include "geometry/query/mesh_tree.h"
 #include "geometry/remesh/cgal_mesh_internal.h"
+#include "geometry/remesh/distance_bound.h"
 #include "geometry/remesh/remesh.h"
 
 namespace effuse::geometry {
@@ -91,9 +92,8 @@ Remeshed simplify(const TriMesh& mesh, Real max_error) {
   for (Vec3& p : positions) p -= middle;
   const MeshTree tree(positions, mesh.triangles);
   Remeshed result;
-  // A tenth is kept back for what lies between the points that are measured.
-  const Real measured = 0.9 * max_error;
-  for (Real asked = measured;; asked *= 0.8) {
+  // A tenth is kept back for what lies between the points that collapses look at.
+  for (Real asked = 0.9 * max_error;; asked *= 0.8) {
     CgalMesh surface = to_cgal_mesh(mesh, middle);
     Original original{positions, tree, {}, asked};
     for (Index v = 0; v < positions.size(); ++v) original.stands_for.push_back({v});
@@ -106,15 +106,16 @@ Remeshed simplify(const TriMesh& mesh, Real max_error) {
       return true;
     });
     result.mesh = from_cgal_mesh(surface, middle);
-    result.error = hausdorff_distance(mesh, result.mesh);
-    if (result.error.largest <= measured) break;
+    result.bound = std::max(distance_bound(mesh, result.mesh, max_error), distance_bound(result.mesh, mesh, max_error));
+    if (result.bound <= max_error) break;
     // Refused at every point, nothing collapses: the input itself.
     if (asked < 0.05 * max_error) {
       result.mesh = mesh;
-      result.error = SurfaceDistance{};
+      result.bound = 0;
       return result;
     }
   }
+  result.error = hausdorff_distance(mesh, result.mesh);
   transfer_attributes(mesh, result.mesh);
   return result;
 }

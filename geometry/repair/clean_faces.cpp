@@ -30,7 +30,9 @@ std::size_t flat_corner(const TriMesh& mesh, const Triangle& t) {
 }  // namespace
 
 void stitch_borders(TriMesh& mesh, Real reach, RepairReport& report) {
-  if (!(reach > 0)) return;
+  // Cells are counted in whole numbers; what is nearer than a millionth of a millionth has been welded.
+  const Box3 box = bounds(mesh);
+  if (!(reach > 1e-12 * box.sizes().norm())) return;
   const EdgeList edges = edges_of(mesh);
   std::vector<Index> border;
   for (std::size_t e = 0; e < edges.size(); ++e)
@@ -45,10 +47,9 @@ void stitch_borders(TriMesh& mesh, Real reach, RepairReport& report) {
     const Real px = mesh.positions[p].x(), qx = mesh.positions[q].x();
     return px != qx ? px < qx : p < q;
   });
-  std::unordered_map<std::int64_t, std::vector<Index>> cells;
-  const Vec3 low = bounds(mesh).min();
+  std::unordered_map<std::uint64_t, std::vector<Index>> cells;
   const auto cell = [&](const Vec3& p, int dx, int dy, int dz) {
-    const auto at = [&](int k, int d) { return static_cast<std::int64_t>(std::floor((p[k] - low[k]) / reach)) + d; };
+    const auto at = [&](int k, int d) { return static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor((p[k] - box.min()[k]) / reach)) + d); };
     return at(0, dx) * 73856093 ^ at(1, dy) * 19349663 ^ at(2, dz) * 83492791;
   };
   std::vector<Index> target(mesh.positions.size());

@@ -95,6 +95,31 @@ void check_nodes(const Json& root, const std::string& name) {
   if (reached < nodes.size()) throw InputError({name}, "its nodes form a ring");
 }
 
+/// Throws when the file asks for more than a reader of plain glTF 2 knows, or has positions that are no floats: assimp 5.2 takes no
+/// notice of extensions, and whole numbers for the bits of floats.
+void check_meaning(const Json& root, const std::string& name) {
+  constexpr const char* kAdvice = "export the mesh again without compression and quantization";
+  if (root.contains("extensionsRequired") && root["extensionsRequired"].is_array())
+    for (const Json& extension : root["extensionsRequired"]) {
+      const std::string what = extension.is_string() ? extension.get<std::string>() : "";
+      // Of looks, which are not used here; draco is assimp's to unpack.
+      const bool harmless = what == "KHR_draco_mesh_compression" || what.starts_with("KHR_materials_") || what.starts_with("KHR_texture_") || what.starts_with("KHR_lights_") ||
+                            what.starts_with("EXT_texture_") || what == "MSFT_texture_dds";
+      if (!harmless) throw InputError({name}, fmt::format("cannot be read without the glTF extension {}, which is not known here: {}", quote(what), kAdvice));
+    }
+  if (!root.contains("meshes") || !root["meshes"].is_array()) return;
+  for (const Json& mesh : root["meshes"]) {
+    if (!mesh.is_object() || !mesh.contains("primitives") || !mesh["primitives"].is_array()) continue;
+    for (const Json& primitive : mesh["primitives"]) {
+      if (!primitive.is_object() || !primitive.contains("attributes")) continue;
+      const auto position = unsigned_member(primitive["attributes"], "POSITION");
+      const Json* accessor = position ? element(root, "accessors", *position) : nullptr;
+      if (accessor && unsigned_member(*accessor, "componentType", 5126) != std::uint64_t{5126})
+        throw InputError({name}, fmt::format("its positions are no floats (accessor {}): {}", *position, kAdvice));
+    }
+  }
+}
+
 /// The numbers of an accessor in the GLB's own binary chunk; nullopt when they are not there to be read.
 std::optional<geometry::VertexAttribute> read_accessor(const Json& root, std::uint64_t number, std::string_view binary) {
   const Json* accessor = element(root, "accessors", number);
@@ -161,7 +186,11 @@ std::optional<geometry::VertexAttribute> read_accessor(const Json& root, std::ui
 
 }  // namespace
 
-void check_gltf_json(std::string_view json, const std::string& name) { check_nodes(parse_json(json, name), name); }
+void check_gltf_json(std::string_view json, const std::string& name) {
+  const Json root = parse_json(json, name);
+  check_nodes(root, name);
+  check_meaning(root, name);
+}
 
 std::string aligned_glb(std::string_view bytes) {
   const std::size_t length = little32(bytes, 12), end = 20 + length;
@@ -187,6 +216,7 @@ std::vector<GlbPrimitive> read_glb_primitives(std::string_view bytes, const std:
     throw InputError({name}, fmt::format("{} bytes of JSON are promised, {} are there: it is truncated", json_length, bytes.size() - 20));
   const Json root = parse_json(bytes.substr(20, json_length), name);
   check_nodes(root, name);
+  check_meaning(root, name);
 
   std::string_view binary;
   const std::size_t next = 20 + json_length;

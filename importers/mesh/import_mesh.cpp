@@ -272,17 +272,18 @@ MeshFrame frame_of_collada(std::string_view text) {
   return frame;
 }
 
-/// FBX says which axis is up and how many centimetres its unit has.
+/// FBX says which axis is up and how many centimetres its unit has. One that points down says nothing of up.
 MeshFrame frame_of_fbx(const aiScene& scene) {
   MeshFrame frame;
   if (!scene.mMetaData) return frame;
-  std::int32_t up = -1;
+  std::int32_t up = -1, sign = 1;
   double factor = 0;
   float factor_f = 0;
-  if (scene.mMetaData->Get("UpAxis", up) && up >= 0 && up <= 2) frame.up = static_cast<UpAxis>(up + 1);
+  scene.mMetaData->Get("UpAxisSign", sign);
+  if (scene.mMetaData->Get("UpAxis", up) && up >= 0 && up <= 2 && sign > 0) frame.up = static_cast<UpAxis>(up + 1);
   if (!scene.mMetaData->Get("UnitScaleFactor", factor) && scene.mMetaData->Get("UnitScaleFactor", factor_f)) factor = factor_f;
   if (std::isfinite(factor) && factor > 0) frame.metres_per_unit = 0.01 * factor;
-  frame.source = "FBX's settings";
+  frame.source = "FBX's header";
   return frame;
 }
 
@@ -291,6 +292,7 @@ MeshFrame frame_of(const std::string& extension, std::string_view bytes, const a
   if (!own.source.empty()) return own;
   if (extension == ".glb" || extension == ".gltf") own = {UpAxis::kY, 1, Vec3::Zero(), "", "glTF's standard"};
   else if (extension == ".x3d" || extension == ".x3db" || extension == ".wrl") own = {UpAxis::kY, 1, Vec3::Zero(), "", "X3D's standard"};
+  else if (extension == ".3ds") own = {UpAxis::kY, 0, Vec3::Zero(), "", "assimp's reader of 3DS"};
   else if (extension == ".dae") own = frame_of_collada(bytes);
   else if (extension == ".fbx") own = frame_of_fbx(scene);
   return own;
@@ -332,6 +334,10 @@ MeshImport read_mesh(const fs::path& file, const MeshOptions& options) {
   const auto ply = std::make_shared<PlyResult>();
   AssimpReader reader;
   reader.add(make_ply_importer(ply), "ply");
+  if (extension == ".prj" && bytes.find_first_of("[") < 20)
+    throw InputError({name}, "is the coordinate system of the grid of the same name: give that one");
+  if (extension == ".xyz" || extension == ".csv" || extension == ".txt" || extension == ".dat")
+    throw InputError({name}, "is no grid of heights: it begins neither with places, x y z, one a line, nor with the header of an ESRI ASCII grid");
   if (extension.empty() || !reader.reads(extension))
     throw InputError({name},
                      fmt::format("there is no reader for files ending in '{}'; meshes: .obj .ply .stl .off .glb .gltf .dae and more, "
@@ -346,6 +352,7 @@ MeshImport read_mesh(const fs::path& file, const MeshOptions& options) {
     if (ply->fault) std::rethrow_exception(ply->fault);
     throw;
   }
+  for (const std::string& other : reader.refused()) notes.push_back("names a file that was not opened: " + other);
   check_finite(*scene, name);
   const FaceCount read = count_faces(*scene, name);
   scene = &reader.process(name, aiProcess_Triangulate);
@@ -376,7 +383,9 @@ MeshImport read_mesh(const fs::path& file, const MeshOptions& options) {
     notes.push_back(fmt::format("polygons gave {} triangles in place of {}: some cross themselves", cut.triangles, read.expected));
   clean(import, name);
   const Box3 box = geometry::bounds(import.mesh);
-  const Real far = std::max(box.min().cwiseAbs().maxCoeff(), box.max().cwiseAbs().maxCoeff());
+  const Real far = std::max(box.min().cwiseAbs().maxCoeff(), box.max().cwiseAbs().maxCoeff()), size = box.sizes().maxCoeff();
+  if (std::max(far, import.frame.origin.cwiseAbs().maxCoeff()) > kFarthest || size < kFinest)
+    throw InputError({name}, fmt::format("is {:.3g} m large and reaches {:.3g} m from its origin, which is nothing on a planet: its numbers or their unit are wrong", size, std::max(far, import.frame.origin.cwiseAbs().maxCoeff())));
   if (extension != ".ply" && !moved && far > 8192)
     notes.push_back(fmt::format("coordinates reach {:.6g}: as floats they come in steps of {:.3g}", far, far * std::pow(2.0, -23)));
   return import;
@@ -388,6 +397,15 @@ MeshImport import_mesh(const fs::path& file, const MeshOptions& options) {
   ZONE("import.mesh");
   if (!options.limits.apart) return read_mesh(file, options);
   return mesh_of_bytes(read_apart(file, options.limits, [&] { return bytes_of_mesh(read_mesh(file, options)); }), file.string());
+}
+
+std::vector<std::string> guesses(const MeshImport& import, const MeshOptions& options) {
+  std::vector<std::string> lines;
+  const Real size = geometry::bounds(import.mesh).sizes().maxCoeff();
+  if (import.frame.metres_per_unit == 0 && options.metres_per_unit == 0)
+    lines.push_back(fmt::format("warning: the file names no unit: metres are assumed, {:.4g} m across; in millimetres it would be {:.4g} m, in feet {:.4g} m (unit)", size, size / 1000, size * 0.3048));
+  if (import.frame.up == UpAxis::kUnknown && options.up == UpAxis::kUnknown) lines.push_back("warning: the file does not say which axis is up: z is assumed (up)");
+  return lines;
 }
 
 }  // namespace effuse::importers

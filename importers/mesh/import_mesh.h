@@ -28,8 +28,8 @@ struct MeshImport {
 /// colour ("color", linear light), scalars by their names, name_x/_y/_z as one attribute of width 3,
 /// glTF's _NAME as "name".
 ///
-/// Up axis and unit: glTF (y, metres) and X3D (y, metres) by their standards, COLLADA and FBX by what stands in the file, files
-/// of ours by their comments; other formats say nothing.
+/// Up axis and unit: glTF (y, metres) and X3D (y, metres) by their standards, 3DS (z) by its own, COLLADA and FBX by what stands in the
+/// file, files of ours by their comments; other formats say nothing.
 /// Digits: PLY is read in double; OBJ, OFF and ASCII STL are shifted to whole metres before assimp parses them, so that map
 /// coordinates stay exact to 1 mm. All other formats pass through assimp's floats, as binary STL and glTF hold them anyway: far
 /// from the origin they come in steps, which a note tells.
@@ -37,5 +37,8 @@ struct MeshImport {
 /// Throws InputError: missing, empty, unreadable, no triangles, positions not finite, index out of range; with
 /// limits.apart also when they are passed, or the parser crashes.
 MeshImport import_mesh(const std::filesystem::path& file, const MeshOptions& options = {});
+
+/// What neither the file nor the options say of its coordinates, and how large it would be otherwise: a warning each.
+std::vector<std::string> guesses(const MeshImport& import, const MeshOptions& options);
 
 }  // namespace effuse::importers

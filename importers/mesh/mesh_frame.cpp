@@ -6,7 +6,6 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "geometry/base/error.h"
 #include "geometry/mesh/measure.h"
 #include "importers/input_file.h"
 
@@ -122,18 +121,6 @@ void turn_up(geometry::TriMesh& mesh, UpAxis up) {
 const char* name_of(UpAxis up) {
   constexpr std::array kNames{"", "x", "y", "z"};
   return kNames[static_cast<std::size_t>(up)];
-}
-
-Real metres_of_unit(const std::string& unit) {
-  const std::pair<const char*, Real> units[] = {{"mm", 1e-3}, {"cm", 1e-2}, {"dm", 0.1}, {"m", 1}, {"km", 1e3}, {"in", 0.0254}, {"ft", 0.3048}, {"us-ft", 1200.0 / 3937}};
-  for (const auto& [name, metres] : units)
-    if (unit == name) return metres;
-  Real number = 0;
-  if (parse_number(unit, number) && std::isfinite(number) && number > 0) return number;
-  std::vector<std::string> names;
-  for (const auto& [name, metres] : units) names.emplace_back(name);
-  const std::string nearest = nearest_name(unit, names);
-  throw InputError(Place{}, fmt::format("no unit of length {}{}", quote(unit), nearest.empty() ? ", wanted mm, cm, m, km, in, ft, us-ft or a number of metres" : ", did you mean '" + nearest + "'?"));
 }
 
 }  // namespace effuse::importers

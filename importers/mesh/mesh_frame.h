@@ -31,8 +31,4 @@ void turn_up(geometry::TriMesh& mesh, UpAxis up);
 /// "x", "y", "z"; "" when unknown.
 const char* name_of(UpAxis up);
 
-/// Metres of a unit of length: "mm", "cm", "m", "km", "in", "ft", "us-ft", or a number of metres ("0.01"). Throws InputError, with the
-/// nearest name.
-Real metres_of_unit(const std::string& unit);
-
 }  // namespace effuse::importers

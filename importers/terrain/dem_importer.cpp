@@ -100,7 +100,7 @@ class DemImporter final : public Assimp::BaseImporter {
     if (!check_signature || !files) return false;
     try {
       const std::string start = read_stream(*files, file, 512);
-      return looks_like_esri_ascii(start) || looks_like_xyz(start);
+      return looks_like_esri_ascii(start) || looks_like_tiff(start) || looks_like_xyz(start);
     } catch (const InputError&) {
       return false;
     }

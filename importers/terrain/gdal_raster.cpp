@@ -1,9 +1,6 @@
 #include "importers/terrain/gdal_raster.h"
 
-#include <cpl_conv.h>
-#include <cpl_string.h>
 #include <fmt/format.h>
-#include <ogr_srs_api.h>
 
 #include <algorithm>
 #include <array>
@@ -24,29 +21,29 @@ constexpr std::array kDrivers = {"GTiff", "SRTMHGT", "USGSDEM", "SDTS", "DTED", 
 constexpr std::array kExtensions = {".tif", ".tiff", ".gtiff", ".hgt", ".dem", ".ddf", ".flt", ".bil", ".bip", ".bsq", ".hdr", ".img", ".nc", ".png", ".dt0", ".dt1", ".dt2", ".grd", ".bt", ".ter"};
 constexpr const char* kExtensionList = "tif tiff gtiff hgt dem ddf flt bil bip bsq hdr img nc png dt0 dt1 dt2 grd bt ter";
 
-void prepare_gdal() {
-  static const bool done = [] {
-    GDALAllRegister();
-    GDALSetCacheMax64(GIntBig{64} << 20);
-    OSRSetPROJEnableNetwork(0);
-    return true;
-  }();
-  static_cast<void>(done);
-}
-
 namespace {
 
 constexpr double kLargestBlock = 512e6;  // bytes
 
 struct CloseDataset {
-  void operator()(GDALDatasetH dataset) const { GDALClose(dataset); }
+  void operator()(GDALDatasetH dataset) const { gdal().GDALClose(dataset); }
 };
 using Dataset = std::unique_ptr<std::remove_pointer_t<GDALDatasetH>, CloseDataset>;
 
+/// GDAL opens what lies beside a file (masks, overviews) by any driver it has: a mask that is a VRT names files and addresses.
+void forget_other_drivers() {
+  for (int k = gdal().GDALGetDriverCount(); k-- > 0;) {
+    const GDALDriverH driver = gdal().GDALGetDriver(k);
+    const std::string_view name = gdal().GDALGetDriverShortName(driver);
+    if (std::find(kDrivers.begin(), kDrivers.end(), name) == kDrivers.end()) gdal().GDALDeregisterDriver(driver);
+  }
+}
+
 Dataset open_named(const std::string& name) {
+  forget_other_drivers();
   std::vector<const char*> drivers(kDrivers.begin(), kDrivers.end());
   drivers.push_back(nullptr);
-  return Dataset(GDALOpenEx(name.c_str(), GDAL_OF_RASTER | GDAL_OF_READONLY, drivers.data(), nullptr, nullptr));
+  return Dataset(gdal().GDALOpenEx(name.c_str(), GDAL_OF_RASTER | GDAL_OF_READONLY, drivers.data(), nullptr, nullptr));
 }
 
 std::string hgt_advice(const fs::path& file) {
@@ -59,10 +56,10 @@ std::string hgt_advice(const fs::path& file) {
 
 /// Of a file with several grids, the one of heights.
 std::string height_grid(GDALDatasetH dataset, const std::string& name) {
-  char** list = GDALGetMetadata(dataset, "SUBDATASETS");
+  char** list = gdal().GDALGetMetadata(dataset, "SUBDATASETS");
   std::vector<std::string> grids;
   for (int k = 1;; ++k) {
-    const char* grid = CSLFetchNameValue(list, fmt::format("SUBDATASET_{}_NAME", k).c_str());
+    const char* grid = gdal().CSLFetchNameValue(list, fmt::format("SUBDATASET_{}_NAME", k).c_str());
     if (!grid) break;
     grids.emplace_back(grid);
   }
@@ -93,10 +90,10 @@ Dataset open_raster(const fs::path& given) {
       why = fs::exists(fs::path(file).replace_extension(".hdr"), ignored) ? why : "its header, " + fs::path(file).replace_extension(".hdr").filename().string() + ", is missing";
     throw InputError({name}, why.empty() || why.find("not recognized as") != std::string::npos ? "is no raster that can be read: its first bytes are none of a format known here" : "cannot be read as a raster: " + why);
   }
-  if (GDALGetRasterCount(dataset.get()) == 0) {
+  if (gdal().GDALGetRasterCount(dataset.get()) == 0) {
     const std::string grid = height_grid(dataset.get(), name);
     dataset = open_named(grid);
-    if (!dataset || GDALGetRasterCount(dataset.get()) == 0) throw InputError({name}, "its grid cannot be read: " + complaints.last("no band"));
+    if (!dataset || gdal().GDALGetRasterCount(dataset.get()) == 0) throw InputError({name}, "its grid cannot be read: " + complaints.last("no band"));
   }
   return dataset;
 }
@@ -104,18 +101,18 @@ Dataset open_raster(const fs::path& given) {
 
 /// A band of heights, not of a photograph's colours.
 void check_band(GDALDatasetH dataset, const std::string& name, std::vector<std::string>& notes) {
-  GDALRasterBandH band = GDALGetRasterBand(dataset, 1);
-  const GDALDataType type = GDALGetRasterDataType(band);
-  if (GDALDataTypeIsComplex(type)) throw InputError({name}, fmt::format("holds complex numbers ({}), wanted heights", GDALGetDataTypeName(type)));
-  const GDALColorInterp colour = GDALGetRasterColorInterpretation(band);
+  GDALRasterBandH band = gdal().GDALGetRasterBand(dataset, 1);
+  const GDALDataType type = gdal().GDALGetRasterDataType(band);
+  if (gdal().GDALDataTypeIsComplex(type)) throw InputError({name}, fmt::format("holds complex numbers ({}), wanted heights", gdal().GDALGetDataTypeName(type)));
+  const GDALColorInterp colour = gdal().GDALGetRasterColorInterpretation(band);
   if (colour == GCI_PaletteIndex) throw InputError({name}, "holds colours from a palette, wanted heights: it is a picture of a map");
-  int bands = GDALGetRasterCount(dataset), others = 0;
-  for (int b = 2; b <= bands; ++b) others += GDALGetRasterColorInterpretation(GDALGetRasterBand(dataset, b)) != GCI_AlphaBand;
+  int bands = gdal().GDALGetRasterCount(dataset), others = 0;
+  for (int b = 2; b <= bands; ++b) others += gdal().GDALGetRasterColorInterpretation(gdal().GDALGetRasterBand(dataset, b)) != GCI_AlphaBand;
   if (colour == GCI_RedBand && others >= 2) throw InputError({name}, "holds red, green and blue, wanted heights: it is a picture of a map");
   if (others > 0) notes.push_back(fmt::format("has {} bands: the first is taken for the heights", bands));
   int width = 0, height = 0;
-  GDALGetBlockSize(band, &width, &height);
-  const double block = static_cast<double>(width) * height * GDALGetDataTypeSizeBytes(type);
+  gdal().GDALGetBlockSize(band, &width, &height);
+  const double block = static_cast<double>(width) * height * gdal().GDALGetDataTypeSizeBytes(type);
   if (block > kLargestBlock) throw InputError({name}, fmt::format("must be read in blocks of {:.0f} MB, at most {:.0f} MB are: write it in tiles (gdal_translate -co TILED=YES)", block / 1e6, kLargestBlock / 1e6));
 }
 
@@ -123,9 +120,9 @@ void check_band(GDALDatasetH dataset, const std::string& name, std::vector<std::
 class Nodata {
  public:
   explicit Nodata(GDALRasterBandH band) {
-    const GDALDataType type = GDALGetRasterDataType(band);
+    const GDALDataType type = gdal().GDALGetRasterDataType(band);
     int has = 0;
-    const double value = GDALGetRasterNoDataValue(band, &has);
+    const double value = gdal().GDALGetRasterNoDataValue(band, &has);
     if (has && type != GDT_Int64 && type != GDT_UInt64) declared_ = value;
     float_ = type == GDT_Float32;
   }
@@ -141,6 +138,10 @@ class Nodata {
 }  // namespace
 
 bool gdal_reads(const std::string& extension) { return std::find(kExtensions.begin(), kExtensions.end(), extension) != kExtensions.end(); }
+bool looks_like_tiff(std::string_view bytes) {
+  constexpr std::array<std::string_view, 4> kStarts = {std::string_view("II*\0", 4), std::string_view("MM\0*", 4), std::string_view("II+\0", 4), std::string_view("MM\0+", 4)};
+  return std::any_of(kStarts.begin(), kStarts.end(), [&](std::string_view start) { return bytes.starts_with(start); });
+}
 const char* gdal_extensions() { return kExtensionList; }
 
 RasterFacts read_raster_facts(const fs::path& file) {
@@ -150,16 +151,16 @@ RasterFacts read_raster_facts(const fs::path& file) {
   const GdalComplaints complaints;
   RasterFacts facts;
   check_band(dataset.get(), name, facts.notes);
-  GDALRasterBandH band = GDALGetRasterBand(dataset.get(), 1);
-  facts.format = GDALGetDriverLongName(GDALGetDatasetDriver(dataset.get()));
-  facts.type = GDALGetDataTypeName(GDALGetRasterDataType(band));
-  facts.frame.columns = GDALGetRasterXSize(dataset.get());
-  facts.frame.rows = GDALGetRasterYSize(dataset.get());
+  GDALRasterBandH band = gdal().GDALGetRasterBand(dataset.get(), 1);
+  facts.format = gdal().GDALGetDriverLongName(gdal().GDALGetDatasetDriver(dataset.get()));
+  facts.type = gdal().GDALGetDataTypeName(gdal().GDALGetRasterDataType(band));
+  facts.frame.columns = gdal().GDALGetRasterXSize(dataset.get());
+  facts.frame.rows = gdal().GDALGetRasterYSize(dataset.get());
 
   std::array<double, 6> t{};
-  facts.placed = GDALGetGeoTransform(dataset.get(), t.data()) == CE_None;
+  facts.placed = gdal().GDALGetGeoTransform(dataset.get(), t.data()) == CE_None;
   if (!facts.placed) {
-    if (GDALGetGCPCount(dataset.get()) > 0) throw InputError({name}, "is tied to the map by control points only: rectify it first (gdalwarp)");
+    if (gdal().GDALGetGCPCount(dataset.get()) > 0) throw InputError({name}, "is tied to the map by control points only: rectify it first (gdalwarp)");
     t = {0, 1, 0, 0, 0, -1};
   }
   for (const double number : t)
@@ -170,16 +171,16 @@ RasterFacts read_raster_facts(const fs::path& file) {
   // GDAL's transform counts from the corner of the first cell, also for files whose own counts from its centre.
   facts.frame.first = Vec2(t[0], t[3]) + (facts.frame.along_columns + facts.frame.along_rows) / 2;
 
-  if (OGRSpatialReferenceH srs = GDALGetSpatialRef(dataset.get())) {
+  if (OGRSpatialReferenceH srs = gdal().GDALGetSpatialRef(dataset.get())) {
     char* wkt = nullptr;
     const std::array options = {"FORMAT=WKT2_2018", static_cast<const char*>(nullptr)};
-    if (OSRExportToWktEx(srs, &wkt, options.data()) == OGRERR_NONE && wkt) facts.crs = wkt;
-    CPLFree(wkt);
+    if (gdal().OSRExportToWktEx(srs, &wkt, options.data()) == OGRERR_NONE && wkt) facts.crs = wkt;
+    gdal().VSIFree(wkt);
   }
   facts.crs_place = name;
-  const char* unit = GDALGetRasterUnitType(band);
+  const char* unit = gdal().GDALGetRasterUnitType(band);
   facts.height_unit = unit ? unit : "";
-  const double scale = GDALGetRasterScale(band, nullptr), offset = GDALGetRasterOffset(band, nullptr);
+  const double scale = gdal().GDALGetRasterScale(band, nullptr), offset = gdal().GDALGetRasterOffset(band, nullptr);
   if (!std::isfinite(scale) || !std::isfinite(offset) || scale == 0) throw InputError({name}, fmt::format("its heights are scaled by {} and offset by {}", scale, offset));
   if (scale != 1 || offset != 0) facts.notes.push_back(fmt::format("heights are the file's numbers times {} plus {}", scale, offset));
   return facts;
@@ -190,22 +191,23 @@ RasterCells read_raster_cells(const fs::path& file, const CellWindow& window) {
   const std::string name = file.string();
   const Dataset dataset = open_raster(file);
   const GdalComplaints complaints;
-  GDALRasterBandH band = GDALGetRasterBand(dataset.get(), 1);
+  GDALRasterBandH band = gdal().GDALGetRasterBand(dataset.get(), 1);
   CHECK(window.column >= 0 && window.row >= 0 && window.columns >= 1 && window.rows >= 1);
-  CHECK(window.column + window.columns <= GDALGetRasterXSize(dataset.get()) && window.row + window.rows <= GDALGetRasterYSize(dataset.get()));
+  CHECK(window.column + window.columns <= gdal().GDALGetRasterXSize(dataset.get()) && window.row + window.rows <= gdal().GDALGetRasterYSize(dataset.get()));
 
   RasterCells cells;
   cells.window = window;
   cells.values.resize(static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows));
   const Nodata nodata(band);
-  const double scale = GDALGetRasterScale(band, nullptr), offset = GDALGetRasterOffset(band, nullptr);
-  const bool masked = (GDALGetMaskFlags(band) & GMF_PER_DATASET) != 0;
+  const double scale = gdal().GDALGetRasterScale(band, nullptr), offset = gdal().GDALGetRasterOffset(band, nullptr);
+  const bool masked = (gdal().GDALGetMaskFlags(band) & GMF_PER_DATASET) != 0;
   std::vector<unsigned char> mask(masked ? static_cast<std::size_t>(window.columns) : 0);
+  Real largest = 0;
   for (int r = 0; r < window.rows; ++r) {
     const std::size_t row = static_cast<std::size_t>(r) * static_cast<std::size_t>(window.columns);
-    if (GDALRasterIO(band, GF_Read, window.column, window.row + r, window.columns, 1, cells.values.data() + row, window.columns, 1, GDT_Float64, 0, 0) != CE_None)
-      throw InputError({name}, fmt::format("row {} of {} cannot be read: {}", window.row + r + 1, GDALGetRasterYSize(dataset.get()), complaints.last("the file is cut short or damaged")));
-    if (masked && GDALRasterIO(GDALGetMaskBand(band), GF_Read, window.column, window.row + r, window.columns, 1, mask.data(), window.columns, 1, GDT_Byte, 0, 0) != CE_None)
+    if (gdal().GDALRasterIO(band, GF_Read, window.column, window.row + r, window.columns, 1, cells.values.data() + row, window.columns, 1, GDT_Float64, 0, 0) != CE_None)
+      throw InputError({name}, fmt::format("row {} of {} cannot be read: {}", window.row + r + 1, gdal().GDALGetRasterYSize(dataset.get()), complaints.last("the file is cut short or damaged")));
+    if (masked && gdal().GDALRasterIO(gdal().GDALGetMaskBand(band), GF_Read, window.column, window.row + r, window.columns, 1, mask.data(), window.columns, 1, GDT_Byte, 0, 0) != CE_None)
       throw InputError({name}, fmt::format("row {} of its mask cannot be read: {}", window.row + r + 1, complaints.last("damaged")));
     for (int c = 0; c < window.columns; ++c) {
       Real& z = cells.values[row + static_cast<std::size_t>(c)];
@@ -215,12 +217,16 @@ RasterCells read_raster_cells(const fs::path& file, const CellWindow& window) {
       else if (nan) ++cells.missing.nans;
       else if (std::isinf(z) || marks_missing(z)) ++cells.missing.undeclared[z];
       else {
+        largest = std::max(largest, std::abs(z));
         z = scale * z + offset;
         continue;
       }
       z = std::numeric_limits<Real>::quiet_NaN();
     }
   }
+  // Floats whose bytes stand the other way round are next to nothing, or beyond all heights.
+  constexpr Real kNothing = 1e-30;
+  if (largest > 0 && largest < kNothing) throw InputError({name}, fmt::format("has no height beyond {:.3g}: its bytes may stand in the other order (byteorder, in its header)", largest));
   return cells;
 }
 

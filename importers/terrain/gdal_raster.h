@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string_view>
 
 #include "importers/terrain/raster.h"
 
@@ -9,6 +10,9 @@ namespace effuse::importers {
 /// Whether GDAL's drivers that we let it use claim a file of this ending: .tif .tiff .hgt .dem .ddf .flt .bil .bip .bsq .hdr .img
 /// .nc .png .dt0 .dt1 .dt2 .grd .bt .jp2 ...
 bool gdal_reads(const std::string& extension);
+
+/// Whether bytes begin as TIFF or BigTIFF do, whatever the file is called.
+bool looks_like_tiff(std::string_view bytes);
 
 /// The extensions of gdal_reads(), separated by blanks, without points: as assimp wants them.
 const char* gdal_extensions();

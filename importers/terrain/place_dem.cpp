@@ -118,6 +118,7 @@ class Placement {
     if (stays) keep_posts(first);
     else move_posts();
     finish();
+    tell_stretch();
     return std::move(grid_);
   }
 
@@ -141,7 +142,11 @@ class Placement {
         unknown_ = true;
       }
     } else if (own.kind == Crs::Kind::kGeographic) {
-      crs_ = utm_of(middle_in_degrees(), own);
+      try {
+        crs_ = utm_of(middle_in_degrees(), own);
+      } catch (const InputError& error) {
+        refuse(fmt::format("counts in degrees, and {}", error.faults().front().message));
+      }
     } else {
       crs_ = own;
       unknown_ = own.kind == Crs::Kind::kUnknown;
@@ -344,7 +349,7 @@ class Placement {
       return;
     }
     if (const auto count = std::count(beside.begin(), beside.end(), 1); count > 0)
-      note(fmt::format("{} posts of the {} x {} lie beside the file, whose edges run askew to the grid's", count, grid_.nx, grid_.ny));
+      note(fmt::format("{} posts of the {} x {} lie {}", count, grid_.nx, grid_.ny, sources_.size() > 1 ? "in none of the files" : "beside the file, whose edges run askew to the grid's"));
   }
 
   /// How far the new surface lies from the file's in the middle of the new cells, where it is farthest as a rule.
@@ -408,6 +413,16 @@ class Placement {
       note(fmt::format("{} closed depressions, up to {:.3g} m deep, were {}, as asked: {} posts changed, {:.4g} m3 {}{}", pits.pits, pits.deepest, options_.pits == PitPolicy::kFill ? "filled" : "breached", pits.posts,
                        pits.volume, options_.pits == PitPolicy::kFill ? "added" : "taken away", pits.kept > 0 ? fmt::format("; {} deeper ones kept", pits.kept) : ""));
     }
+  }
+
+  /// Web Mercator and projections made for other places count in metres that are none.
+  void tell_stretch() {
+    constexpr Real kTrue = 0.01;
+    if (crs_.kind != Crs::Kind::kProjected || crs_.wkt.empty()) return;
+    const Vec2 middle = grid_.corner + grid_.spacing.cwiseProduct(Vec2(grid_.nx - 1, grid_.ny - 1)) / 2, stretch = stretch_at(crs_, middle);
+    if (!stretch.allFinite() || (stretch - Vec2::Ones()).cwiseAbs().maxCoeff() < kTrue) return;
+    note(fmt::format("warning: on this map lengths are {:.3g} times (east) and {:.3g} times (north) those on the ground, heights are not: crs = \"EPSG:{}\" has true ones here", stretch.x(), stretch.y(),
+                     utm_of(degrees_at(crs_, middle), {}).epsg));
   }
 
   void check_ground() const {

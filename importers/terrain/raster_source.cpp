@@ -7,9 +7,11 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
+#include <stdexcept>
 #include <utility>
 
 #include "geometry/base/error.h"
+#include "geometry/base/length_unit.h"
 #include "importers/input_file.h"
 #include "importers/terrain/esri_ascii.h"
 #include "importers/terrain/gdal_raster.h"
@@ -21,7 +23,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr Real kFoot = 0.3048, kSurveyFoot = 1200.0 / 3937.0;  // [m], both exact
 
 /// The first bytes of a file; empty when it cannot be opened.
 std::string first_bytes(const fs::path& file, std::size_t count = 4096) {
@@ -64,35 +65,20 @@ std::string projection_beside(const fs::path& file, RasterFacts& facts) {
 
 }  // namespace
 
-std::optional<Real> length_unit(std::string_view name) {
-  std::string word = lower(name);
-  std::erase_if(word, [](char c) { return c == ' ' || c == '_' || c == '-' || c == '.'; });
-  static const std::vector<std::pair<Real, std::vector<std::string>>> kUnits = {
-      {1, {"m", "metre", "meter", "metres", "meters"}},
-      {kFoot, {"ft", "foot", "feet", "internationalfoot", "footintl", "intlfoot"}},
-      {kSurveyFoot, {"usft", "ftus", "ussurveyfoot", "ussurveyfeet", "surveyfoot", "surveyfeet", "usfoot", "usfeet", "footus"}},
-      {0.1, {"dm", "decimetre", "decimeter", "decimetres", "decimeters"}},
-      {0.01, {"cm", "centimetre", "centimeter", "centimetres", "centimeters"}},
-      {0.001, {"mm", "millimetre", "millimeter", "millimetres", "millimeters"}},
-      {1000, {"km", "kilometre", "kilometer", "kilometres", "kilometers"}},
-      {0.9144, {"yd", "yard", "yards"}},
-      {1.8288, {"fathom", "fathoms"}}};
-  for (const auto& [metres, names] : kUnits)
-    if (std::find(names.begin(), names.end(), word) != names.end()) return metres;
-  return std::nullopt;
-}
-
 bool is_dem(const fs::path& file) {
   const std::string extension = lower_extension(file);
   if (extension == ".asc" || gdal_reads(extension)) return true;
   const std::string bytes = first_bytes(file);
-  return looks_like_esri_ascii(bytes) || is_xyz(file, bytes);
+  return looks_like_esri_ascii(bytes) || looks_like_tiff(bytes) || is_xyz(file, bytes);
 }
 
 RasterSource::RasterSource(fs::path file, const DemOptions& options, const ReadText& read_text) : file_(std::move(file)) {
   const std::string name = file_.string(), extension = lower_extension(file_), start = first_bytes(file_);
   // Surfer's .grd and Arc's own share an ending: bytes come first.
-  if (looks_like_esri_ascii(start) || extension == ".asc") {
+  // The header of a raw grid has the same keys, and no heights.
+  if ((looks_like_esri_ascii(start) && extension != ".hdr") || extension == ".asc") {
+    const bool begins = start.find_first_not_of(" \t\r\n") < 256;
+    if (begins && !looks_like_esri_ascii(start)) parse_esri_ascii(start, name);  // says what is wrong before gigabytes are read
     text_ = parse_esri_ascii(read_text(file_), name);
     facts_ = facts_of(*text_, "ESRI ASCII grid");
   } else if (is_xyz(file_, start)) {
@@ -108,6 +94,10 @@ RasterSource::RasterSource(fs::path file, const DemOptions& options, const ReadT
   find_height_unit(options);
   const Vec2 far = facts_.frame.at(facts_.frame.columns - 1, facts_.frame.rows - 1);
   if (!far.allFinite() || !facts_.frame.first.allFinite()) throw InputError({name}, "its place on the map is not made of finite numbers");
+  if (crs_.kind == Crs::Kind::kGeographic) return;
+  const Real farthest = std::max(far.cwiseAbs().maxCoeff(), facts_.frame.first.cwiseAbs().maxCoeff()), cell = std::min(facts_.frame.along_columns.norm(), facts_.frame.along_rows.norm());
+  if (farthest > kFarthest) throw InputError({name}, fmt::format("reaches {:.6g} m from its map's origin, which is no place on a planet: its numbers or their unit are wrong", farthest));
+  if (cell < std::max(kFinest, 1e-12 * farthest)) throw InputError({name}, fmt::format("has posts {:.3g} m apart, too near to be told apart at {:.6g} m from its map's origin", cell, farthest));
 }
 
 void RasterSource::place_image(const DemOptions& options) {
@@ -142,14 +132,16 @@ bool RasterSource::looks_like_degrees() const {
   for (const auto& [c, r] : {std::pair{0, 0}, {frame.columns - 1, 0}, {0, frame.rows - 1}, {frame.columns - 1, frame.rows - 1}})
     if (const Vec2 p = frame.at(c, r); std::abs(p.x()) > 360 || std::abs(p.y()) > 90) return false;
   const Real cell = std::max(frame.along_columns.norm(), frame.along_rows.norm());
-  if (cell > 0.5) return false;
-  // In metres it would be higher than it is wide.
+  constexpr Real kMetres = 111e3;  // of a degree
+  if (cell > 0.5 || cell * kMetres < kFinest) return false;
+  // In metres it would be higher than it is wide, in degrees it is not.
   const CellWindow middle{std::max(0, frame.columns / 2 - 32), std::max(0, frame.rows / 2 - 32), std::min(frame.columns, 64), std::min(frame.rows, 64)};
   const RasterCells cells = read(middle);
   Real low = std::numeric_limits<Real>::infinity(), high = -low;
   for (const Real z : cells.values)
     if (!std::isnan(z)) low = std::min(low, z), high = std::max(high, z);
-  return high - low > 3 * cell * std::max(middle.columns, middle.rows);
+  const Real width = cell * std::max(middle.columns, middle.rows);
+  return high - low > 3 * width && high - low < 3 * kMetres * width;
 }
 
 void RasterSource::find_crs(const DemOptions& options) {
@@ -183,9 +175,11 @@ void RasterSource::find_height_unit(const DemOptions& options) {
   Real unit = 1;
   std::string why;
   if (!options.vertical_unit.empty()) {
-    const auto asked = length_unit(options.vertical_unit);
-    if (!asked) throw InputError({"vertical_unit"}, fmt::format("{} is no unit of length, wanted m, ft, us-ft, cm, ...", quote(options.vertical_unit)));
-    unit = *asked;
+    try {
+      unit = parse_length_unit(options.vertical_unit);
+    } catch (const std::invalid_argument& error) {
+      throw InputError({"vertical_unit"}, error.what());
+    }
     why = "as asked";
   } else if (const auto told = length_unit(facts_.height_unit)) {
     unit = *told;

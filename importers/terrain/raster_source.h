@@ -45,9 +45,6 @@ class RasterSource {
   Real z_scale_ = 1, z_offset_ = 0;
 };
 
-/// Metres in a unit of heights: "m", "metre", "ft", "foot", "US survey foot", "us-ft", "cm", ...; nullopt: not one.
-std::optional<Real> length_unit(std::string_view name);
-
 /// Whether import_dem reads the file: by its ending or its first bytes.
 bool is_dem(const std::filesystem::path& file);
 

@@ -1,8 +1,6 @@
 #include "importers/terrain/spatial_reference.h"
 
-#include <cpl_conv.h>
 #include <fmt/format.h>
-#include <ogr_srs_api.h>
 
 #include <algorithm>
 #include <cmath>
@@ -18,58 +16,57 @@ namespace effuse::importers {
 namespace {
 
 struct Release {
-  void operator()(OGRSpatialReferenceH srs) const { OSRRelease(srs); }
+  void operator()(OGRSpatialReferenceH srs) const { gdal().OSRRelease(srs); }
 };
 using Srs = std::unique_ptr<std::remove_pointer_t<OGRSpatialReferenceH>, Release>;
 
 Srs new_srs() {
-  prepare_gdal();
-  Srs srs(OSRNewSpatialReference(nullptr));
+  Srs srs(gdal().OSRNewSpatialReference(nullptr));
   CHECK(srs != nullptr);
-  OSRSetAxisMappingStrategy(srs.get(), OAMS_TRADITIONAL_GIS_ORDER);
+  gdal().OSRSetAxisMappingStrategy(srs.get(), OAMS_TRADITIONAL_GIS_ORDER);
   return srs;
 }
 
 std::string text_of(char* taken) {
   std::string text = taken ? taken : "";
-  CPLFree(taken);
+  gdal().VSIFree(taken);
   return text;
 }
 
 std::string wkt_of(OGRSpatialReferenceH srs) {
   char* wkt = nullptr;
-  if (OSRExportToWkt(srs, &wkt) != OGRERR_NONE) wkt = nullptr;
+  if (gdal().OSRExportToWkt(srs, &wkt) != OGRERR_NONE) wkt = nullptr;
   return text_of(wkt);
 }
 
 std::string attribute(OGRSpatialReferenceH srs, const char* node) {
-  const char* value = OSRGetAttrValue(srs, node, 0);
+  const char* value = gdal().OSRGetAttrValue(srs, node, 0);
   return value ? value : "";
 }
 
 Crs describe(OGRSpatialReferenceH srs, const std::string& place) {
   Crs crs;
   char* unit = nullptr;
-  if (OSRIsProjected(srs)) {
+  if (gdal().OSRIsProjected(srs)) {
     crs.kind = Crs::Kind::kProjected;
-    crs.unit = OSRGetLinearUnits(srs, &unit);
+    crs.unit = gdal().OSRGetLinearUnits(srs, &unit);
     crs.title = attribute(srs, "PROJCS");
-  } else if (OSRIsGeographic(srs)) {
+  } else if (gdal().OSRIsGeographic(srs)) {
     crs.kind = Crs::Kind::kGeographic;
-    crs.unit = OSRGetAngularUnits(srs, &unit) * 180 / kPi;
+    crs.unit = gdal().OSRGetAngularUnits(srs, &unit) * 180 / kPi;
     if (std::abs(crs.unit - 1) < 1e-9) crs.unit = 1;
     crs.title = attribute(srs, "GEOGCS");
-  } else if (OSRIsLocal(srs)) {
+  } else if (gdal().OSRIsLocal(srs)) {
     crs.kind = Crs::Kind::kLocal;
-    crs.unit = OSRGetLinearUnits(srs, &unit);
+    crs.unit = gdal().OSRGetLinearUnits(srs, &unit);
     crs.title = attribute(srs, "LOCAL_CS");
   } else {
     throw InputError({place}, fmt::format("'{}' is no coordinate system of a map: wanted a projected one, or degrees", printable(wkt_of(srs), 60)));
   }
   crs.unit_name = unit ? unit : "";
   if (!(crs.unit > 0) || !std::isfinite(crs.unit)) throw InputError({place}, fmt::format("the coordinate system '{}' has units of {} m", printable(crs.title, 60), crs.unit));
-  const char* authority = OSRGetAuthorityName(srs, nullptr);
-  const char* code = OSRGetAuthorityCode(srs, nullptr);
+  const char* authority = gdal().OSRGetAuthorityName(srs, nullptr);
+  const char* code = gdal().OSRGetAuthorityCode(srs, nullptr);
   if (authority && code && std::string(authority) == "EPSG") crs.epsg = std::atoi(code);
   crs.wkt = wkt_of(srs);
   if (crs.title.empty()) crs.title = "unnamed";
@@ -80,50 +77,50 @@ Crs describe(OGRSpatialReferenceH srs, const std::string& place) {
 int known_code(OGRSpatialReferenceH srs) {
   int count = 0;
   int* confidence = nullptr;
-  OGRSpatialReferenceH* matches = OSRFindMatches(srs, nullptr, &count, &confidence);
+  OGRSpatialReferenceH* matches = gdal().OSRFindMatches(srs, nullptr, &count, &confidence);
   int code = 0;
   if (count > 0 && confidence[0] >= 90 && (count == 1 || confidence[1] < confidence[0])) {
-    const char* authority = OSRGetAuthorityName(matches[0], nullptr);
-    const char* number = OSRGetAuthorityCode(matches[0], nullptr);
+    const char* authority = gdal().OSRGetAuthorityName(matches[0], nullptr);
+    const char* number = gdal().OSRGetAuthorityCode(matches[0], nullptr);
     if (authority && number && std::string(authority) == "EPSG") code = std::atoi(number);
   }
-  OSRFreeSRSArray(matches);
-  CPLFree(confidence);
+  gdal().OSRFreeSRSArray(matches);
+  gdal().VSIFree(confidence);
   return code;
 }
 
 Crs from_epsg(int code) {
   const Srs srs = new_srs();
   const GdalComplaints complaints;
-  if (OSRImportFromEPSG(srs.get(), code) != OGRERR_NONE) throw InputError(Place{}, fmt::format("EPSG:{}: {}", code, complaints.last("not a coordinate system that PROJ knows")));
+  if (gdal().OSRImportFromEPSG(srs.get(), code) != OGRERR_NONE) throw InputError(Place{}, fmt::format("EPSG:{}: {}", code, complaints.last("not a coordinate system that PROJ knows")));
   return describe(srs.get(), fmt::format("EPSG:{}", code));
 }
 
 Srs srs_of(const Crs& crs) {
   Srs srs = new_srs();
   const GdalComplaints complaints;
-  CHECK(OSRSetFromUserInput(srs.get(), crs.wkt.c_str()) == OGRERR_NONE);
+  CHECK(gdal().OSRSetFromUserInput(srs.get(), crs.wkt.c_str()) == OGRERR_NONE);
   return srs;
 }
 
 }  // namespace
 
 Crs read_crs(const std::string& text, const std::string& place) {
-  if (text.find_first_not_of(" \t\r\n") == std::string::npos) return {};
+  if (text.empty()) return {};
   Srs srs = new_srs();
   const GdalComplaints complaints;
   // Not files and addresses, which GDAL would open too.
-  const std::string start = lower(std::string_view(text).substr(text.find_first_not_of(" \t\r\n"), 40));
+  const std::string start = lower(std::string_view(text).substr(std::min(text.find_first_not_of(" \t\r\n"), text.size()), 40));
   const bool named = start.starts_with("epsg:") || start.starts_with("esri:") || start.starts_with("+proj") || start.starts_with("+init") || start.starts_with("ogc:") ||
                      start.starts_with("urn:ogc:") || start.find_first_of("[({") != std::string::npos || start == "wgs84" || start == "nad83";
   const char* advice = "wanted an EPSG code as in EPSG:32616, WKT or a PROJ string";
   if (!named) throw InputError({place}, fmt::format("{} is no coordinate system: {}", quote(utf8(text)), advice));
-  if (OSRSetFromUserInput(srs.get(), utf8(text).c_str()) != OGRERR_NONE)
+  if (gdal().OSRSetFromUserInput(srs.get(), utf8(text).c_str()) != OGRERR_NONE)
     throw InputError({place}, fmt::format("{} is no coordinate system ({}): {}", quote(utf8(text)), complaints.last("not understood"), advice));
   double vertical = 0;
-  if (OSRIsCompound(srs.get()) || OSRIsVertical(srs.get())) {
-    vertical = OSRGetTargetLinearUnits(srs.get(), "VERT_CS", nullptr);
-    if (OSRIsCompound(srs.get())) OSRStripVertical(srs.get());
+  if (gdal().OSRIsCompound(srs.get()) || gdal().OSRIsVertical(srs.get())) {
+    vertical = gdal().OSRGetTargetLinearUnits(srs.get(), "VERT_CS", nullptr);
+    if (gdal().OSRIsCompound(srs.get())) gdal().OSRStripVertical(srs.get());
   }
   Crs crs = describe(srs.get(), place);
   crs.vertical_unit = vertical;
@@ -149,7 +146,7 @@ Crs in_metres(const Crs& crs) {
   if (crs.wkt.empty()) return metric;
   const Srs srs = srs_of(crs);
   const GdalComplaints complaints;
-  OSRSetLinearUnitsAndUpdateParameters(srs.get(), "metre", 1.0);
+  gdal().OSRSetLinearUnitsAndUpdateParameters(srs.get(), "metre", 1.0);
   const double vertical = crs.vertical_unit;
   metric = describe(srs.get(), crs.title);
   metric.vertical_unit = vertical;
@@ -170,15 +167,32 @@ Crs utm_of(const Vec2& degrees, const Crs& geographic) {
   return from_epsg((north < 0 ? 32700 : 32600) + zone);
 }
 
+Vec2 degrees_at(const Crs& crs, const Vec2& place) { return CrsTransform(crs, from_epsg(4326))(place); }
+
+Vec2 stretch_at(const Crs& crs, const Vec2& place) {
+  CHECK(crs.kind == Crs::Kind::kProjected && crs.metric());
+  constexpr double kAxis = 6378137, kSquaredEccentricity = 0.00669437999014, kHalf = 50;  // WGS 84 [m]; half a short line on the map [m]
+  const CrsTransform to_degrees(crs, from_epsg(4326));
+  const double latitude = to_degrees(place).y() * kPi / 180, w = 1 - kSquaredEccentricity * std::sin(latitude) * std::sin(latitude);
+  const double along_parallel = kAxis * std::cos(latitude) / std::sqrt(w), along_meridian = kAxis * (1 - kSquaredEccentricity) / (w * std::sqrt(w));  // [m/rad]
+  Vec2 stretch;
+  for (int axis = 0; axis < 2; ++axis) {
+    Vec2 step = to_degrees(place + kHalf * Vec2::Unit(axis)) - to_degrees(place - kHalf * Vec2::Unit(axis));
+    step.x() -= 360 * std::round(step.x() / 360);
+    stretch[axis] = 2 * kHalf / (step.cwiseProduct(Vec2(along_parallel, along_meridian)) * kPi / 180).norm();
+  }
+  return stretch;
+}
+
 struct CrsTransform::Impl {
   OGRCoordinateTransformationH transform = nullptr;
-  ~Impl() { OCTDestroyCoordinateTransformation(transform); }
+  ~Impl() { gdal().OCTDestroyCoordinateTransformation(transform); }
 };
 
 CrsTransform::CrsTransform(const Crs& from, const Crs& to) : impl_(std::make_unique<Impl>()) {
   const Srs a = srs_of(from), b = srs_of(to);
   const GdalComplaints complaints;
-  impl_->transform = OCTNewCoordinateTransformation(a.get(), b.get());
+  impl_->transform = gdal().OCTNewCoordinateTransformation(a.get(), b.get());
   if (!impl_->transform)
     throw InputError(Place{}, fmt::format("there is no way from {} to {}: {}", to_string(from), to_string(to), complaints.last("PROJ knows none")));
 }
@@ -194,7 +208,7 @@ void CrsTransform::operator()(std::span<Vec2> points) const {
   for (std::size_t begin = 0; begin < points.size(); begin += kAtOnce) {
     const std::size_t n = std::min(kAtOnce, points.size() - begin);
     for (std::size_t i = 0; i < n; ++i) x[i] = points[begin + i].x(), y[i] = points[begin + i].y();
-    OCTTransformEx(impl_->transform, static_cast<int>(n), x.data(), y.data(), nullptr, good.data());
+    gdal().OCTTransformEx(impl_->transform, static_cast<int>(n), x.data(), y.data(), nullptr, good.data());
     for (std::size_t i = 0; i < n; ++i) {
       const bool there = good[i] && std::isfinite(x[i]) && std::isfinite(y[i]);
       points[begin + i] = there ? Vec2(x[i], y[i]) : Vec2(Vec2::Constant(std::numeric_limits<double>::quiet_NaN()));

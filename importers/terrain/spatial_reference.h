@@ -39,6 +39,13 @@ Crs in_metres(const Crs& crs);
 /// UTM has it (ETRS89, NAD83), else of WGS 84.
 Crs utm_of(const Vec2& degrees, const Crs& geographic);
 
+/// How long a metre of the ground, east and north, is on the map at a place of it: 1 in a projection made for the place, 1.5 in Web
+/// Mercator at 48 degrees. NaN where there is no such place. Only for projected systems in metres (checked). To a millionth.
+Vec2 stretch_at(const Crs& crs, const Vec2& place);
+
+/// A place on the map in degrees, longitude first, of WGS 84; NaN where there is none.
+Vec2 degrees_at(const Crs& crs, const Vec2& place);
+
 /// Positions of one system in another, x east and y north in both, geographic ones in degrees, longitude first
 /// whatever the authority's order of axes. By PROJ, without its network. One thread at a time.
 class CrsTransform {

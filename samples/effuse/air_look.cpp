@@ -1,6 +1,9 @@
 #include "samples/effuse/air_look.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cstdio>
 
 #include "flow/particles/density_grid.h"
 #include "geometry/procedural/primitives.h"
@@ -44,6 +47,33 @@ void add_cloud(skin::Air& air, const NamedCloud& cloud, Real exposure) {
 
 void add_volume(skin::Air& air, geometry::GridVolume volume, const Vec3& color) {
   if (volume.size() > 0) air.clouds.push_back({std::move(volume), color});
+}
+
+skin::Metadata with_color(skin::Metadata about, const Vec3& color) {
+  about.emplace_back("color", fmt::format("{} {} {}", color.x(), color.y(), color.z()));
+  return about;
+}
+
+skin::Metadata with_look(skin::Metadata about, const NamedCloud& cloud) {
+  if (cloud.look == NamedCloud::Look::kPuffs || cloud.soft) return about;
+  about.emplace_back("look", cloud.look == NamedCloud::Look::kGlow ? "glow" : "grains");
+  return with_color(std::move(about), cloud.color);
+}
+
+std::optional<Vec3> color_of(const skin::Metadata& about) {
+  Vec3 color;
+  for (const auto& [name, text] : about)
+    if (name == "color" && std::sscanf(text.c_str(), "%lf %lf %lf", &color.x(), &color.y(), &color.z()) == 3) return color;
+  return std::nullopt;
+}
+
+bool take_look(const skin::Metadata& about, NamedCloud& cloud) {
+  const std::optional<Vec3> color = color_of(about);
+  const auto look = std::find_if(about.begin(), about.end(), [](const auto& one) { return one.first == "look"; });
+  if (!color || look == about.end()) return false;
+  cloud.color = *color;
+  cloud.look = look->second == "glow" ? NamedCloud::Look::kGlow : NamedCloud::Look::kGrains;
+  return true;
 }
 
 geometry::TriMesh spheres_of(const NamedCloud& cloud) {

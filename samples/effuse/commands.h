@@ -26,6 +26,7 @@ struct RunCommand {
   std::filesystem::path scene, folder;
   int frames = 0;  ///< 0: as the scene says
   bool resume = false, force = false;
+  int from_frame = 0;  ///< go on differently from here, the frames before stay; 0: no
   bool stats = false;  ///< print all zones of the profile
   std::vector<std::string> set;
 };
@@ -38,29 +39,33 @@ struct CheckCommand {
 ExitCode check(const CheckCommand& command, const CommonOptions& common);
 
 ExitCode info(const std::vector<std::filesystem::path>& files, const CommonOptions& common);
-ExitCode effects(const CommonOptions& common);
 
-/// `effuse import`: terrain into the form another program wants. Lengths may carry their unit.
+/// `effuse effects`: every key that a scene may have, for people, as JSON, or as the schema of scene files.
+struct EffectsCommand {
+  bool schema = false;  ///< JSON schema, for editors
+};
+ExitCode effects(const EffectsCommand& command, const CommonOptions& common);
+
+/// `effuse import`: terrain into the form another program wants. Options that a scene's [terrain] has as keys are read as those are
+/// (terrain_settings.h); "" and none: not given. Lengths may carry their unit.
 struct ImportCommand {
   std::vector<std::filesystem::path> files;  ///< one terrain, or the tiles of one
   std::filesystem::path output;              ///< .tif .asc: a grid; .ply .obj .glb .stl .off: a mesh
-  std::string max_error;                     ///< of a grid's mesh at its posts, or of a mesh from itself [m]; empty: all posts or vertices stay
-  std::string crs, file_crs;                 ///< to work in; of the files
-  std::vector<double> crop;                  ///< west, south, east, north; empty: all
-  std::string resample;                      ///< "10 m", "cubic", or both with a comma; empty: as the file has them
-  std::string vertical_unit;                 ///< of the files' heights
-  std::string holes = "hole";                ///< or "fill", "error"
-  std::string pits = "keep";                 ///< or "fill", "breach"; "fill:2m": only those up to 2 m deep
-  std::vector<double> size, range;           ///< of an image's ground and heights [m]
-  std::uint64_t max_posts = 50'000'000;
-  // Of meshes:
-  std::string up;                            ///< "x", "y", "z"; empty: as the file says, or z
-  std::string units;                         ///< "mm", "ft", ...; empty: as the file says, or metres
-  bool keep = false;                         ///< not repaired
-  std::string edge;                          ///< remeshed to triangles of such edges; empty: not
-  std::string fill_holes;                    ///< up to such a diagonal, or "all"; empty: none
-  std::string cell;                          ///< between the posts of a grid made of it
+  std::string max_error;                     ///< of a grid's mesh at its posts, or of a mesh from itself [m]; all posts or vertices stay
+  std::string crs;
+  std::vector<double> crop;
   bool on_map = false;                       ///< positions as map coordinates, not relative to an origin: .ply .obj .off
+  std::uint64_t max_posts = 50'000'000;
+  // Of grids:
+  std::string file_crs, vertical_unit, holes;
+  std::string resample;                      ///< spacing, method, or both: "10 m,cubic"
+  std::string pits;                          ///< policy, or with the depth: "fill:2m"
+  std::vector<double> size, range;
+  // Of meshes:
+  std::string up, unit, stitch, edge;
+  bool keep = false;                         ///< repair = false
+  std::string fill_holes;                    ///< or "all"
+  std::string cell;                          ///< between the posts of a grid made of it
 };
 /// Says each thing that it changed. Nothing is written when the input is refused.
 ExitCode import_terrain_file(const ImportCommand& command, const CommonOptions& common);
@@ -97,12 +102,46 @@ struct SkinCommand {
 /// triangles that intersect. Files written before a frame that cannot be read stay.
 ExitCode skin_particles(const SkinCommand& command, const CommonOptions& common);
 
+/// `effuse render`: pictures of a run's frames, from its files, by another camera and light.
+struct RenderCommand {
+  std::filesystem::path run, folder;  ///< folder empty: RUN/render
+  std::string frames;                 ///< "12", "10-40", "10-", "-40"; empty: all
+  int every = 1;                      ///< only each so many'th
+  std::vector<std::string> to = {"png"};  ///< png, exr, mp4, gif
+  bool force = false;
+  std::vector<std::string> set;       ///< of [preview] alone
+};
+/// Files already made stay when a later frame cannot be read. mp4 and gif are made by ffmpeg, where there is one.
+ExitCode render_run(const RenderCommand& command, const CommonOptions& common);
+
+/// `effuse view`: a run as one page of HTML that needs nothing else.
+struct ViewCommand {
+  std::filesystem::path folder, output;  ///< output empty: view.html in the folder
+  std::size_t triangles = 30000;         ///< of the lava in a frame, at most; of the ground twice as many; 0: all there are
+  std::string frames;                    ///< "10-60"; empty: all
+  int every = 1;                         ///< frame of them
+  std::string title;                     ///< empty: the run's name
+};
+ExitCode view(const ViewCommand& command, const CommonOptions& common);
+
+/// `effuse export`: the frames of a run as other programs want them.
+struct ExportCommand {
+  std::filesystem::path folder;        ///< of the run
+  std::filesystem::path output;        ///< folder to write; empty: the run's own, where its output.formats would have put them
+  std::vector<std::string> formats;    ///< vtp usda bgeo glb-flipbook geotiff ply obj glb
+  std::string frames;                  ///< "A-B"; empty: all
+};
+/// Reads the run's PLY files, or GLB where there are none. What is missing is told and left out. The first Ctrl-C ends it after the frame in hand.
+ExitCode export_run(const ExportCommand& command, const CommonOptions& common);
+
 /// `effuse study`; not called study, which is a namespace.
 struct StudyCommand {
   std::vector<std::string> names;  ///< of studies; empty: all
   std::filesystem::path folder;
   std::vector<std::string> cases;  ///< only these; empty: all, or all quick ones
   bool full = false, resume = false, strict = false, list = false;
+  bool cheapest = false;   ///< print, from the costs the folder holds, the cheapest setting for an error; run nothing
+  bool calibrate = false;  ///< measure this machine instead, and keep the figures for `effuse check`
 };
 ExitCode run_studies(const StudyCommand& command, const CommonOptions& common);
 

@@ -226,7 +226,7 @@ void FlowWriter::remove_old_records() const {
   for (const fs::path& file : old) fs::remove(file, ignored);
 }
 
-bool FlowWriter::restore() {
+bool FlowWriter::restore(const std::string& scene_key) {
   if (!effect_) return true;
   const fs::path file = record_file(loaded_.simulation->frame());
   std::error_code ignored;
@@ -239,7 +239,7 @@ bool FlowWriter::restore() {
   Real last_time = 0, last_emitted = 0;
   in.text("magic", magic);
   in.text("scene", key);
-  if (magic != kMagic || key != loaded_.key) return false;  // left by another version, or another run
+  if (magic != kMagic || key != (scene_key.empty() ? loaded_.key : scene_key)) return false;  // left by another version, or another run
   in.value("frame", frame);
   in.text("rows", rows);
   in.value("last_time", last_time);

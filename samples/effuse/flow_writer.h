@@ -58,7 +58,8 @@ class FlowWriter {
   void remove_old_records() const;
   /// Goes back to what had been gathered at the simulation's frame. False when its record is missing or damaged, the
   /// state here as it was. Throws InputError when it was gathered with other settings.
-  bool restore();
+  /// scene_key: of the record, where it is not this scene's.
+  bool restore(const std::string& scene_key = {});
 
   /// For the manifest: name and path of what has been written.
   std::vector<std::pair<std::string, std::string>> files() const;

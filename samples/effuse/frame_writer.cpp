@@ -13,7 +13,9 @@
 #include "skin/preview/preview.h"
 #include "skin/surface/level_set.h"
 #include "samples/effuse/air_look.h"
+#include "samples/effuse/flipbook_export.h"
 #include "samples/effuse/solid_things.h"
+#include "samples/effuse/views.h"
 #include "skin/tessellate/make_skin.h"
 #include "skin/write/write_points.h"
 #include "skin/write/write_volume.h"
@@ -23,14 +25,12 @@ namespace effuse {
 namespace fs = std::filesystem;
 
 namespace {
-constexpr Real kShutter = 0.5;  // of a frame's time: what flies is drawn as long as it flies in that
-
 std::string numbered(const char* stem, int frame, const char* extension) { return fmt::format("{}.{:04}.{}", stem, frame, extension); }
 }  // namespace
 
 FrameWriter::FrameWriter(const flow::Scene& scene, const skin::SkinSettings& settings, const geometry::Terrain& terrain,
                          const SolidThings& solids, fs::path folder)
-    : scene_(scene), settings_(settings), terrain_(terrain), solids_(solids), folder_(std::move(folder)) {
+    : scene_(scene), settings_(settings), terrain_(terrain), solids_(solids), folder_(std::move(folder)), film_({scene.fps, scene.time_scale}, {settings.vtp, settings.usda}, folder_) {
   for (const flow::EffectPlan& plan : scene.effects) lava_ |= plan.name == "lava";
   if (settings.preview) preview_ = std::make_unique<skin::Preview>(terrain.mesh());
 }
@@ -51,17 +51,20 @@ void FrameWriter::write_terrain() {
   ZONE("write.terrain");
   skin::write_ply(folder_ / "terrain.ply", terrain_.mesh(), metadata(0, 0));
   skin::write_glb(folder_ / "terrain.glb", terrain_.mesh(), metadata(0, 0));
+  film_.add_still("terrain", terrain_.mesh(), metadata(0, 0));
   if (!solids_.any()) return;
   const geometry::TriMesh solids = solids_.at(scene_.frame_time(1));
   skin::write_ply(folder_ / "obstacles.ply", solids, metadata(0, 0));
   skin::write_glb(folder_ / "obstacles.glb", solids, metadata(0, 0));
+  if (!solids_.any_moves()) film_.add_still("obstacles", solids, metadata(0, 0));
 }
 
 FrameWriter::Result FrameWriter::write_frame(const flow::Simulation& simulation) {
   const int frame = simulation.frame();
   const skin::Metadata about = metadata(frame, simulation.time());
   Result result;
-  if (!settings_.ply && !settings_.obj && !settings_.glb && !settings_.vdb && !preview_) return result;  // nobody asked for frames
+  const bool exports = settings_.vtp || settings_.usda;
+  if (!settings_.ply && !settings_.obj && !settings_.glb && !settings_.vdb && !settings_.bgeo && !exports && !preview_) return result;  // nobody asked for frames
   skin::Skin skin;
   for (const auto& effect : simulation.effects()) {
     if (effect->spacing() <= 0) continue;
@@ -74,6 +77,7 @@ FrameWriter::Result FrameWriter::write_frame(const flow::Simulation& simulation)
     result.volume = skin.report.volume.after > 0 ? skin.report.volume.after : skin.report.level_set.volume;
     if (preview_) warn_of_lava_on(skin::picture_at(settings_, terrain_, frame / scene_.fps).camera.eye, points, effect->spacing(), frame);
     result.particle_volume = effect->volume();
+    if (settings_.bgeo) write_film_bgeo(folder_ / "frames" / numbered("lava", frame, "bgeo"), points, scene_.time_scale);
   }
   const geometry::TriMesh& mesh = skin.mesh;
   result.regions = skin.regions.size();
@@ -86,6 +90,7 @@ FrameWriter::Result FrameWriter::write_frame(const flow::Simulation& simulation)
   if (lava_ && settings_.ply) skin::write_skin_ply(frames / numbered("skin", frame, "ply"), mesh, skin.regions, about);
   if (lava_ && settings_.obj) skin::write_obj(frames / numbered("skin", frame, "obj"), mesh, about);
   if (lava_ && settings_.glb) skin::write_glb(frames / numbered("skin", frame, "glb"), mesh, about);
+  if (lava_) film_.add("skin", frame, mesh, about);
   if (lava_ && settings_.vdb) skin::write_vdb(frames / numbered("lava", frame, "vdb"), skin.surface, about);
   std::vector<geometry::RigidPose> poses;
   for (const auto& effect : simulation.effects())
@@ -98,30 +103,34 @@ FrameWriter::Result FrameWriter::write_frame(const flow::Simulation& simulation)
   const bool moving = pieces_ || solids_.any_moves();
   const geometry::TriMesh solids = solids_.at(simulation.time(), poses, pieces);
   if (settings_.ply && moving) skin::write_ply(frames / numbered("obstacles", frame, "ply"), solids, about);
+  if (moving) film_.add("obstacles", frame, solids, about);
   geometry::TriMesh others = solids;
   for (const auto& effect : simulation.effects())
     for (flow::NamedMesh& own : effect->meshes()) {
       if (std::find(meshes_.begin(), meshes_.end(), own.name) == meshes_.end()) meshes_.push_back(own.name);
       if (settings_.ply) write_own(own, frame);
+      film_.add(own.name, frame, own.mesh, about);
       if (preview_) append_to_picture(others, own.mesh);
     }
   skin::Air air;
   const Real exposure = kShutter * scene_.time_scale / scene_.fps;
   for (const auto& effect : simulation.effects()) {
     for (const flow::NamedCloud& cloud : effect->clouds()) {
+      if ((cloud.points || cloud.spheres) && std::find(meshes_.begin(), meshes_.end(), cloud.name) == meshes_.end()) meshes_.push_back(cloud.name);
       if (settings_.ply && (cloud.points || cloud.spheres)) {
-        if (std::find(meshes_.begin(), meshes_.end(), cloud.name) == meshes_.end()) meshes_.push_back(cloud.name);
         const fs::path file = frames / numbered(cloud.name.c_str(), frame, "ply");
         if (cloud.spheres) skin::write_ply(file, spheres_of(cloud), about);
-        else skin::write_points_ply(file, cloud.view(), about);
+        else skin::write_points_ply(file, cloud.view(), with_look(about, cloud));
       }
+      if (exports && cloud.points) film_.add(cloud.name, frame, mesh_of_points(cloud.view()), about);
+      if (settings_.bgeo && cloud.points) write_film_bgeo(frames / numbered(cloud.name.c_str(), frame, "bgeo"), cloud.view(), scene_.time_scale);
       if (preview_) add_cloud(air, cloud, exposure);
     }
     const std::optional<Vec3> color = effect->draws_volumes();
     if (!settings_.vdb && !(preview_ && color)) continue;
     for (geometry::GridVolume& volume : effect->volumes()) {
       if (std::find(volumes_.begin(), volumes_.end(), volume.name) == volumes_.end()) volumes_.push_back(volume.name);
-      if (settings_.vdb) skin::write_volume_vdb(frames / numbered(volume.name.c_str(), frame, "vdb"), volume, about);
+      if (settings_.vdb) skin::write_volume_vdb(frames / numbered(volume.name.c_str(), frame, "vdb"), volume, color ? with_color(about, *color) : about);
       if (preview_ && color) add_volume(air, std::move(volume), *color);
     }
   }
@@ -170,6 +179,12 @@ void FrameWriter::write_contact_sheet(int frames) {
   if (!pictures.empty()) skin::write_contact_sheet(folder_ / "preview" / "contact_sheet.png", pictures, labels, 3);
 }
 
+void FrameWriter::write_collections(int frames_done) const {
+  if (settings_.vtp || settings_.usda)
+    film_.finish(frames_done, film_views(settings_, terrain_, frames_done, scene_.fps), static_cast<Real>(settings_.picture.width) / settings_.picture.height, metadata(0, 0));
+  if (settings_.flipbook && frames_done == scene_.frames) write_film_glb(folder_);
+}
+
 void FrameWriter::write_manifest(int frames_done, const std::vector<std::pair<std::string, std::string>>& flow) const {
   using nlohmann::ordered_json;
   const geometry::Georeference& geo = terrain_.georeference();
@@ -181,10 +196,10 @@ void FrameWriter::write_manifest(int frames_done, const std::vector<std::pair<st
   m["fps"] = scene_.fps;
   m["time_scale"] = scene_.time_scale;
   m["units"] = {{"length", "m"}, {"time", "s"}, {"temperature", "K"}, {"velocity", "m/s"}};
-  m["up_axis"] = {{"ply", "z"}, {"obj", "z"}, {"vdb", "z"}, {"glb", "y"}};
+  m["up_axis"] = {{"ply", "z"}, {"obj", "z"}, {"vdb", "z"}, {"vtp", "z"}, {"usda", "z"}, {"bgeo", "z"}, {"glb", "y"}};
   m["origin"] = {geo.origin.x(), geo.origin.y(), geo.origin.z()};
   m["crs"] = geo.crs;
-  m["color_space"] = {{"ply", "srgb"}, {"obj", "srgb"}, {"glb", "linear"}};
+  m["color_space"] = {{"ply", "srgb"}, {"obj", "srgb"}, {"glb", "linear"}, {"usda", "linear"}, {"vtp", "color: srgb, color_linear: linear"}};
   const Box3 box = terrain_.bounds();
   m["terrain"] = {{"files", {"terrain.ply", "terrain.glb"}},
                   {"min", {box.min().x(), box.min().y(), box.min().z()}},
@@ -196,12 +211,19 @@ void FrameWriter::write_manifest(int frames_done, const std::vector<std::pair<st
   if (lava_ && settings_.obj) files["obj"] = "frames/skin.####.obj";
   if (lava_ && settings_.glb) files["glb"] = "frames/skin.####.glb";
   if (lava_ && settings_.vdb) files["vdb"] = "frames/lava.####.vdb";
-  for (const std::string& name : meshes_)
+  if (lava_ && settings_.vtp) files["vtp"] = "frames/skin.####.vtp";
+  if (lava_ && settings_.usda) files["usda"] = "frames/skin.####.usda";
+  if (lava_ && settings_.bgeo) files["bgeo"] = "frames/lava.####.bgeo";
+  for (const std::string& name : meshes_) {
     if (settings_.ply) files[name] = fmt::format("frames/{}.####.ply", name);
+    if (settings_.vtp) files[name + "_vtp"] = fmt::format("frames/{}.####.vtp", name);
+    if (settings_.usda) files[name + "_usda"] = fmt::format("frames/{}.####.usda", name);
+  }
   for (const std::string& name : volumes_)
     if (settings_.vdb) files[name + "_vdb"] = fmt::format("frames/{}.####.vdb", name);
   if (settings_.preview) files["preview"] = "preview/preview.####.png";
   m["files"] = files;
+  m["camera"] = {{"width", settings_.picture.width}, {"height", settings_.picture.height}, {"fov", "from bottom to top, radians"}, {"keys", ordered_json::parse(json_of(film_views(settings_, terrain_, scene_.frames, scene_.fps)))}};
   for (const auto& [name, path] : flow) m["flow"][name] = path;
   m["attributes"] = {{"temperature", "K"}, {"velocity", "m/s"}, {"crust", "0 molten .. 1 solid"}, {"region", "id of the particle whose Voronoi region it is, PLY only"}};
   if (pieces_ || solids_.any_breaks()) {

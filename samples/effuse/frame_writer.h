@@ -8,6 +8,7 @@
 
 #include "flow/scene/scene.h"
 #include "flow/scene/simulation.h"
+#include "samples/effuse/film_export.h"
 #include "samples/effuse/solid_things.h"
 #include "geometry/terrain/terrain.h"
 #include "skin/scene/skin_settings.h"
@@ -41,6 +42,9 @@ class FrameWriter {
   /// preview/contact_sheet.png of twelve pictures spread over the film; nothing without pictures.
   void write_contact_sheet(int frames);
 
+  /// What joins the frames so far: .pvd and .vtp.series, film.usda, as the formats ask for; film.glb when the film is done.
+  void write_collections(int frames_done) const;
+
   /// manifest.json: what is where, in which units. flow: names and paths of maps and series (FlowWriter::files).
   void write_manifest(int frames_done, const std::vector<std::pair<std::string, std::string>>& flow) const;
 
@@ -59,6 +63,7 @@ class FrameWriter {
   bool lava_ = false;  // or bodies alone: no skin
   std::unique_ptr<skin::Preview> preview_;
   std::vector<std::string> meshes_, volumes_;  // names of what effects show beside the lava
+  FilmExport film_;
   skin::SurfaceCache last_;  // saves work, changes nothing
 };
 

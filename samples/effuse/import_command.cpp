@@ -1,15 +1,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <cstdint>
+#include <limits>
 #include <nlohmann/json.hpp>
-#include <optional>
-#include <stdexcept>
 #include <utility>
 
-#include "geometry/base/units.h"
 #include "geometry/terrain/triangulate.h"
+#include "importers/input_file.h"
 #include "importers/terrain/import_dem.h"
 #include "importers/terrain/import_terrain.h"
 #include "samples/effuse/commands.h"
@@ -22,47 +21,7 @@ namespace effuse {
 
 namespace fs = std::filesystem;
 
-namespace {
-
 using json = nlohmann::ordered_json;
-
-/// The index of word among names, or a fault that names the nearest.
-template <std::size_t n>
-std::size_t one_of(const std::string& word, const std::array<const char*, n>& names, const std::string& option) {
-  const auto found = std::find(names.begin(), names.end(), word);
-  if (found != names.end()) return static_cast<std::size_t>(found - names.begin());
-  const std::vector<std::string> all(names.begin(), names.end());
-  const std::string nearest = nearest_name(word, all);
-  throw InputError(Place{}, nearest.empty() ? fmt::format("{}: no such choice '{}', wanted one of {}", option, word, fmt::join(all, ", ")) : fmt::format("{}: no such choice '{}', did you mean '{}'?", option, word, nearest));
-}
-
-importers::TerrainImportOptions options_of(const ImportCommand& command, const importers::ReadLimits& limits) {
-  importers::TerrainImportOptions options;
-  importers::DemOptions& dem = options.dem;
-  dem.crs = command.crs;
-  dem.file_crs = command.file_crs;
-  dem.crop = command.crop;
-  dem.vertical_unit = command.vertical_unit;
-  dem.size = command.size;
-  dem.range = command.range;
-  dem.max_posts = command.max_posts;
-  dem.limits = limits;
-  dem.holes = static_cast<importers::HolePolicy>(one_of(command.holes, std::array{"hole", "fill", "error"}, "--holes"));
-  const std::size_t colon = command.pits.find(':');
-  dem.pits = static_cast<importers::PitPolicy>(one_of(command.pits.substr(0, colon), std::array{"keep", "fill", "breach"}, "--pits"));
-  if (colon != std::string::npos) dem.pit_depth = metres(command.pits.substr(colon + 1), "--pits");
-  for (std::size_t at = 0; at < command.resample.size();) {
-    const std::size_t end = std::min(command.resample.find(',', at), command.resample.size());
-    const std::string part = command.resample.substr(at, end - at);
-    at = end + 1;
-    if (part.find_first_of("0123456789") == 0 || part.starts_with('.')) dem.spacing = metres(part, "--resample");
-    else dem.resampling = static_cast<importers::Resampling>(one_of(part, std::array{"auto", "nearest", "bilinear", "cubic", "average"}, "--resample"));
-    if (dem.spacing == 0 && part.find_first_of("0123456789") == 0) throw InputError(Place{}, "--resample: posts 0 m apart, wanted more");
-  }
-  return options;
-}
-
-}  // namespace
 
 void write_import_grid(const fs::path& file, const std::string& format, const importers::DemGrid& grid, ImportReport& report) {
   skin::Raster raster;
@@ -83,14 +42,11 @@ namespace {
 
 /// A grid of heights, to a grid or a mesh.
 void import_grid(const ImportCommand& command, const std::string& format, const importers::ReadLimits& limits, ImportReport& report) {
-  const std::array<std::pair<const char*, bool>, 6> of_meshes = {{{"--up", !command.up.empty()}, {"--units", !command.units.empty()}, {"--keep", command.keep}, {"--edge", !command.edge.empty()}, {"--fill-holes", !command.fill_holes.empty()}, {"--cell", !command.cell.empty()}}};
-  for (const auto& [option, given] : of_meshes)
-    if (given) throw InputError({command.files.front().string()}, fmt::format("is a grid of heights, and {} is for meshes{}", option, std::string_view(option) == "--cell" ? ": --resample says how far apart posts are" : ""));
-
+  const importers::TerrainImportOptions options = import_options(command, true, limits);
+  if (!command.cell.empty()) throw InputError(Place{}, fmt::format("--cell: is for meshes, and '{}' is a grid of heights: --resample says how far apart posts are", command.files.front().string()));
   const bool to_grid = is_grid_format(format);
   if (to_grid && !command.max_error.empty()) throw InputError(Place{}, fmt::format("--max-error is of a mesh, and {} is a grid", command.output.string()));
   const Real max_error = command.max_error.empty() ? 0 : metres(command.max_error, "--max-error");
-  const importers::TerrainImportOptions options = options_of(command, limits);
   importers::DemGrid grid = importers::import_dem(command.files, options.dem);
   report.lines = grid.notes;
   report.facts["grid"] = {{"nx", grid.nx}, {"ny", grid.ny}, {"spacing_m", {grid.spacing.x(), grid.spacing.y()}}, {"south_west_post", {grid.corner.x(), grid.corner.y()}}, {"holes", grid.nodata}, {"crs", grid.crs}};
@@ -131,6 +87,12 @@ ExitCode import_terrain_file(const ImportCommand& command, const CommonOptions& 
   std::error_code ignored;
   for (const fs::path& file : command.files)
     if (fs::equivalent(file, command.output, ignored)) throw InputError(Place{}, fmt::format("-o {}: is what is read, and would be lost", command.output.string()));
+
+  for (const fs::path& file : command.files) importers::check_input(file, std::numeric_limits<std::uint64_t>::max(), "terrain");
+
+  if (command.files.size() > 1)
+    for (const fs::path& file : command.files)
+      if (!importers::is_dem(file)) throw InputError({file.string()}, "is no grid of heights: only those make a mosaic");
 
   ImportReport report;
   const importers::ReadLimits limits = read_limits(common);

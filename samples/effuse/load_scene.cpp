@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
+#include <ctime>
 
 #include "flow/effects/registry.h"
 #include "geometry/terrain/plane.h"
@@ -10,6 +12,7 @@
 #include "geometry/base/zones.h"
 #include "importers/scene/jello_scene.h"
 #include "importers/scene/scene_file.h"
+#include "importers/terrain/import_dem.h"
 #include "importers/terrain/import_terrain.h"
 #include "importers/worlds/jello_world.h"
 #include "samples/effuse/flow_writer.h"
@@ -33,6 +36,15 @@ std::vector<flow::Node*> tables_with_files(const std::string& name, flow::Node& 
           if (emitter.find("file")) all.push_back(&emitter);
   }
   return all;
+}
+
+void erase(flow::Node& table, const std::string& key) {
+  for (std::size_t k = 0; k < table.entries.size(); ++k) {
+    if (table.entries[k].first != key) continue;
+    table.entries.erase(table.entries.begin() + static_cast<std::ptrdiff_t>(k));
+    if (k < table.key_places.size()) table.key_places.erase(table.key_places.begin() + static_cast<std::ptrdiff_t>(k));
+    return;
+  }
 }
 
 /// The tables that decide the state of frame n, whatever the number of frames and the files made of it.
@@ -60,6 +72,27 @@ std::string state_key(const flow::Node& resolved, const geometry::Terrain& terra
   hash.add(start.state_hash());
   return hash.hex();
 }
+/// A scene that says how right it is to be need not say how large particles are, or says spacing = "auto": until they are chosen, any size
+/// lets the rest be read.
+bool leave_spacing_open(flow::Node& scene) {
+  const flow::Node *quality = scene.find("quality"), *accuracy = scene.find("accuracy");
+  if (!(quality && quality->text != "none") && !(accuracy && accuracy->find("front"))) return false;
+  for (auto& [name, table] : scene.entries) {
+    if (name != "lava" || table.kind != flow::Node::Kind::kTable) continue;
+    if (const flow::Node* said = table.find("spacing"); said && !(said->kind == flow::Node::Kind::kText && said->text == "auto")) continue;
+    flow::Node any;
+    any.kind = flow::Node::Kind::kReal;
+    any.real = 1;
+    any.place = table.place;
+    table.set("spacing", any);
+    return true;
+  }
+  return false;
+}
+void forget_spacing(flow::Node& scene) {
+  for (auto& [name, table] : scene.entries)
+    if (name == "lava") erase(table, "spacing");
+}
 }  // namespace
 
 importers::ReadLimits read_limits(const CommonOptions& common) {
@@ -75,20 +108,25 @@ std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const
 
   auto loaded = std::make_unique<LoadedScene>();
   std::vector<Fault> faults;
-  flow::Parameters root(node);
-  loaded->scene = flow::read_scene(root, flow::effect_kinds());
-  loaded->skin = skin::read_skin_settings(root);
+  const bool open = leave_spacing_open(node);
+  std::optional<flow::Parameters> root(node);
+  loaded->scene = flow::read_scene(*root, flow::effect_kinds());
+  loaded->skin = skin::read_skin_settings(*root);
   try {
-    root.finish();
+    root->finish();
   } catch (const InputError& error) {
     faults = error.faults();
   }
 
   const flow::Scene& scene = loaded->scene;
   std::vector<std::filesystem::path> terrain_paths;
+  bool is_grid = false;
   if (!scene.terrain.files.empty()) {
     try {
       for (const std::string& name : scene.terrain.files) terrain_paths.push_back(std::filesystem::path(name).is_relative() ? file.parent_path() / name : std::filesystem::path(name));
+      is_grid = terrain_paths.size() > 1 || importers::is_dem(terrain_paths.front());
+      if (std::filesystem::exists(terrain_paths.front()))
+        for (const Fault& fault : flow::misfits(*node.find("terrain"), "terrain", is_grid, scene.terrain.files.front())) faults.push_back(fault);
       importers::TerrainImport import = importers::import_terrain(terrain_paths, terrain_options(scene.terrain, limits));
       loaded->terrain = std::move(import.terrain);
       loaded->notes = std::move(import.notes);
@@ -118,13 +156,29 @@ std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const
     for (const flow::EffectPlan& plan : scene.effects)
       for (const Fault& fault : plan.misfits(world())) faults.push_back(fault);
   }
+  if (faults.empty() && loaded->terrain && scene.accuracy) {
+    if (open) forget_spacing(node);
+    ZONE("rehearse");
+    const auto start = std::chrono::steady_clock::now();
+    const std::clock_t processor = std::clock();
+    loaded->forecast = budget::forecast(node, *scene.accuracy, world());
+    loaded->rehearsal_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    loaded->rehearsal_processor_seconds = static_cast<double>(std::clock() - processor) / CLOCKS_PER_SEC;
+    root.emplace(node);
+    loaded->scene = flow::read_scene(*root, flow::effect_kinds());
+    loaded->skin = skin::read_skin_settings(*root);
+    root->finish();
+  }
   if (faults.empty() && loaded->terrain) {
     loaded->simulation = std::make_unique<flow::Simulation>(scene, world());
     loaded->solids.make_looks();
     check_map(loaded->skin, *loaded->terrain, *loaded->simulation);
     skin::check_camera(loaded->skin, *loaded->terrain, scene.frames, scene.fps);
     check_camera_among(loaded->solids, loaded->skin, *loaded->terrain, scene);
-    flow::Node resolved = root.resolved();
+    flow::Node resolved = root->resolved();
+    // What was wanted has been chosen: the resolved scene says that, and needs no rehearsal.
+    erase(resolved, "accuracy");
+    erase(resolved, "quality");
     // The resolved scene is written elsewhere: there, too, it must find its files.
     const auto whole = [](const std::filesystem::path& path) {
       flow::Node node_of;
@@ -138,6 +192,7 @@ std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const
         files.kind = flow::Node::Kind::kArray;
         for (const std::filesystem::path& path : terrain_paths) files.items.push_back(whole(std::filesystem::absolute(path).lexically_normal()));
         table.set("file", files.items.size() == 1 ? files.items.front() : files);
+        flow::drop_misfits(table, is_grid);
       }
       for (flow::Node* one : tables_with_files(name, table))
         if (const flow::Node* path = one->find("file"); path && !path->text.empty()) one->set("file", whole(std::filesystem::absolute(file.parent_path() / path->text).lexically_normal()));

@@ -10,6 +10,7 @@
 #include "flow/scene/simulation.h"
 #include "geometry/terrain/terrain.h"
 #include "importers/read_apart.h"
+#include "samples/budget/forecast.h"
 #include "samples/effuse/commands.h"
 #include "samples/effuse/solid_things.h"
 #include "skin/scene/skin_settings.h"
@@ -25,10 +26,13 @@ struct LoadedScene {
   std::optional<geometry::Terrain> terrain;
   SolidThings solids;  ///< the simulation refers to them
   std::vector<std::string> notes;  ///< of the imports
+  std::optional<budget::Forecast> forecast;  ///< where the scene says how right it is to be: what was chosen for that, and what it will come to
+  double rehearsal_seconds = 0, rehearsal_processor_seconds = 0;  ///< that this took
   std::unique_ptr<flow::Simulation> simulation;
 };
 
-/// Throws InputError with every fault of the scene, the terrain's file among them; nothing is written.
+/// Throws InputError with every fault of the scene, the terrain's file among them; nothing is written. A scene with [accuracy] is rehearsed
+/// (budget::forecast), which takes some seconds.
 /// overrides: key=value each; frames > 0 replaces film.frames.
 /// limits: of its terrain's and meshes' files.
 std::unique_ptr<LoadedScene> load_scene(const std::filesystem::path& file, const std::vector<std::string>& overrides, int frames, const importers::ReadLimits& limits = {true, 0, 0});

@@ -21,6 +21,7 @@
 #include "geometry/base/log.h"
 #include "geometry/base/parallel.h"
 #include "samples/effuse/commands.h"
+#include "samples/effuse/describe_commands.h"
 
 namespace {
 
@@ -37,7 +38,10 @@ int report(ExitCode code, const std::vector<effuse::Fault>& faults, bool json) {
     effuse::print_document(j.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   }
   for (const effuse::Fault& fault : faults) {
-    const std::string line = "error: " + to_string(fault) + "\n";
+    std::string line = "error: " + to_string(fault);
+    // One line each, and nothing that a file's name or content could make a terminal do.
+    std::replace_if(line.begin(), line.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }, '?');
+    line += '\n';
     std::fwrite(line.data(), 1, line.size(), stderr);  // who closed stderr does not want to know
   }
   return static_cast<int>(code);
@@ -130,13 +134,14 @@ void add_import_options(CLI::App* verb, effuse::ImportCommand& import) {
   verb->add_option("--vertical-unit", import.vertical_unit, "of the file's heights: m, ft, us-ft, cm [as the file says, or m]");
   verb->add_option("--holes", import.holes, "posts without data: hole leaves them, fill spans a smooth surface, error refuses [hole]");
   verb->add_option("--pits", import.pits, "closed depressions: keep, fill to where they overflow, breach drains them by a notch; fill:2m only those up to 2 m deep [keep]");
-  verb->add_option("--size", import.size, "of an image without a place: east-west north-south in metres, first post to last")->expected(2)->delimiter(',')->check(CLI::PositiveNumber);
+  verb->add_option("--size", import.size, "of an image without a place: east-west north-south in metres, first post to last")->expected(2)->delimiter(',');
   verb->add_option("--range", import.range, "of an image: heights in metres of its darkest and brightest values")->expected(2)->delimiter(',');
   verb->add_option("--max-posts", import.max_posts, "refuse more [50000000]")->check(CLI::Range(std::uint64_t{4}, std::uint64_t{4000000000}));
   verb->add_flag("--on-map", import.on_map, "write positions as map coordinates, in all their digits, not relative to an origin: .ply .obj .off");
   verb->add_option("--up", import.up, "of a mesh: its axis that points up [as the file says, or z]")->check(CLI::IsMember({"x", "y", "z"}));
-  verb->add_option("--units", import.units, "of a mesh's numbers: mm, cm, m, km, in, ft, us-ft, or metres of one [as the file says, or m]");
+  verb->add_option("--unit,--units", import.unit, "of a mesh's numbers: mm, cm, m, km, in, ft, us-ft, or metres of one [as the file says, or m]");
   verb->add_flag("--keep", import.keep, "of a mesh: leave it as it is; absent: it is repaired (welded, wound one way, parted where it is not manifold, degenerate and duplicate triangles dropped)");
+  verb->add_option("--stitch", import.stitch, "of a mesh: borders no farther apart become one ('1 mm') [a millionth of its size]");
   verb->add_option("--fill-holes", import.fill_holes, "of a mesh: fill holes up to this diagonal ('2 m'), or all [none]");
   verb->add_option("--edge", import.edge, "of a mesh: new triangles with edges about so long ('2 m'); sharp edges and borders stay");
   verb->add_option("--cell", import.cell, "of a grid made of a mesh: distance between its posts ('5 m')");
@@ -183,9 +188,20 @@ int main(int argc, char** argv) {
   run_verb->add_option("-o,--output", run.folder, "folder to write; out/SCENE when absent");
   run_verb->add_option("--frames", run.frames, "make this many frames")->check(CLI::Range(1, 9999));
   run_verb->add_flag("--resume", run.resume, "go on with the run in the folder, from its newest checkpoint");
-  run_verb->add_flag("--force", run.force, "replace the run that the folder holds");
+  run_verb->add_option("--from-frame", run.from_frame, "make the folder's run anew from this frame on, with the scene as it is now (--set lava.rheology.a=-3 ...); the frames before stay as they are")->check(CLI::Range(2, 9999))->excludes("--resume");
+  run_verb->add_flag("--force", run.force, "replace the run that the folder holds")->excludes("--from-frame");
   run_verb->add_flag("--stats", run.stats, "say at the end where all of the time went; run.json has it in any case");
   add_set(run_verb, run.set);
+
+  effuse::RenderCommand render;
+  CLI::App* render_verb = add_common(app.add_subcommand("render", "pictures of a run's frames again, by another camera and light, without simulating again"));
+  render_verb->add_option("run", render.run, "folder of a run that wrote ply")->required();
+  render_verb->add_option("-o,--output", render.folder, "folder for the pictures; RUN/render when absent");
+  render_verb->add_option("--frames", render.frames, "which: 12, 10-40, 10- or -40; absent: all");
+  render_verb->add_option("--every", render.every, "only each so many'th [1]")->check(CLI::Range(1, 9999));
+  render_verb->add_option("--to", render.to, "png, exr (linear light, half floats), mp4, gif (by ffmpeg, where it is installed); several with commas [png]")->delimiter(',')->check(CLI::IsMember({"png", "exr", "mp4", "gif"}));
+  render_verb->add_flag("--force", render.force, "replace the pictures that are there");
+  add_set(render_verb, render.set);
 
   effuse::CheckCommand check;
   CLI::App* check_verb = add_common(app.add_subcommand("check", "say all that is wrong with a scene, or what it would cost"));
@@ -200,31 +216,59 @@ int main(int argc, char** argv) {
   CLI::App* import_verb = add_common(app.add_subcommand("import", "terrain and meshes as other programs want them: reprojected, cropped, resampled, filled, repaired, simplified; grids as meshes to a stated error, meshes as grids"));
   add_import_options(import_verb, import);
 
-  CLI::App* effects_verb = add_common(app.add_subcommand("effects", "the effects there are, and their parameters"));
+  effuse::EffectsCommand effects;
+  CLI::App* effects_verb = add_common(app.add_subcommand("effects", "the effects there are, and every key of a scene"));
+  effects_verb->add_flag("--schema", effects.schema, "print a JSON schema of scene files (draft 2020-12), for editors");
 
   effuse::SkinCommand skin;
   CLI::App* skin_verb = add_common(app.add_subcommand("skin", "the surface of any program's particles as a mesh: PLY, VTK, VTP, VTU, BGEO, XYZ, CSV in, PLY, OBJ, GLB, VDB out"));
   add_skin_options(skin_verb, skin);
 
+  effuse::ViewCommand view;
+  CLI::App* view_verb = add_common(app.add_subcommand("view", "one HTML page to scrub through a run: opens from disk, needs nothing else"));
+  view_verb->add_option("folder", view.folder, "of a run")->required();
+  view_verb->add_option("-o,--output", view.output, "page to write; view.html in the folder when absent");
+  view_verb->add_option("--triangles", view.triangles, "of the lava in a frame, at most; the ground may have twice as many; 0: as many as there are")->capture_default_str();
+  view_verb->add_option("--frames", view.frames, "only these: 10-60");
+  view_verb->add_option("--every", view.every, "only every so manieth of them")->check(CLI::Range(1, 9999));
+  view_verb->add_option("--title", view.title, "of the page; the run's name when absent");
+
+  effuse::ExportCommand exports;
+  CLI::App* export_verb = add_common(app.add_subcommand("export", "the frames of a run in other formats: VTP, USDA, BGEO, a GLB of the whole film, GeoTIFF, PLY, OBJ, GLB"));
+  export_verb->add_option("folder", exports.folder, "the run's folder")->required();
+  export_verb->add_option("--to", exports.formats, "vtp (and .pvd, .vtp.series), usda (and film.usda), bgeo (particles), glb-flipbook (film.glb), geotiff (maps), ply, obj, glb; several with commas")
+      ->required()
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  export_verb->add_option("-o,--output", exports.output, "folder to write; the run's own when absent");
+  export_verb->add_option("--frames", exports.frames, "only these: 10-48");
+
   effuse::StudyCommand study;
   CLI::App* study_verb = add_common(app.add_subcommand("study", "compare effuse with exact, converged and measured references: tables, curves, plots, a page"));
-  study_verb->add_option("name", study.names, "studies: validation, skin; all when absent");
+  study_verb->add_option("name", study.names, "studies: validation, skin, integrators, lava, heat, terrain, solvers; all when absent");
   study_verb->add_option("-o,--output", study.folder, "folder to write; out/study when absent");
   study_verb->add_option("--case", study.cases, "run this case only; may be given several times")->allow_extra_args(false);
   study_verb->add_flag("--full", study.full, "the slow cases, too: minutes each");
   study_verb->add_flag("--resume", study.resume, "keep the results of this version that the folder holds (DIR/cases; remove a file there to run its case anew)");
   study_verb->add_flag("--strict", study.strict, "exit 1 when a figure misses its bar");
+  study_verb->add_flag("--calibrate", study.calibrate, "measure this machine, half a minute, and keep its figures for the times that `effuse check` predicts (in $XDG_CACHE_HOME/effuse or ~/.cache/effuse)");
+  study_verb->add_flag("--cheapest", study.cheapest, "print, from what the studies wrote to the folder, a table of the cheapest setting for an error, and run none");
   study_verb->add_flag("--list", study.list, "print the cases there are, and run none");
+
+  std::string shell;
+  CLI::App* completions_verb = app.add_subcommand("completions", "a completion script for a shell: effuse completions bash > ~/.local/share/bash-completion/completions/effuse");
+  completions_verb->add_option("shell", shell, "bash, zsh or fish")->required()->check(CLI::IsMember({"bash", "zsh", "fish"}));
+  CLI::App* manual_verb = app.add_subcommand("manual", "effuse(1) for man: effuse manual | man -l -");
 
   // What goes wrong before the arguments are parsed keeps the promise of --json, too.
   const bool asks_json = std::find(argv + 1, argv + argc, std::string_view("--json")) != argv + argc;
 
   // A typing error in the verb: name the nearest one instead of CLI11's list.
   if (argc > 1 && argv[1][0] != '-') {
-    const std::vector<std::string> verbs = {"run", "check", "info", "import", "effects", "skin", "study"};
+    const std::vector<std::string> verbs = effuse::verb_names(app);
     if (std::find(verbs.begin(), verbs.end(), argv[1]) == verbs.end()) {
       const std::string nearest = effuse::nearest_name(argv[1], verbs);
-      return report(ExitCode::kBadInput, fmt::format("no verb '{}'; {}", argv[1], nearest.empty() ? "there are run, check, info, import, effects, skin, study" : "did you mean '" + nearest + "'?"), asks_json);
+      return report(ExitCode::kBadInput, fmt::format("no verb '{}'; {}", argv[1], nearest.empty() ? fmt::format("there are {}", fmt::join(verbs, ", ")) : "did you mean '" + nearest + "'?"), asks_json);
     }
   }
   try {
@@ -238,12 +282,20 @@ int main(int argc, char** argv) {
   std::optional<effuse::ThreadLimit> limit;
   if (common.threads > 0) limit.emplace(common.threads);
   try {
+    if (*completions_verb || *manual_verb) {
+      const std::string text = *manual_verb ? effuse::man_page(app, EFFUSE_VERSION) : effuse::completions(app, shell);
+      std::fwrite(text.data(), 1, text.size(), stdout);
+      return flushed(ExitCode::kDone);
+    }
     if (*run_verb) return flushed(effuse::run(run, common));
+    if (*render_verb) return flushed(effuse::render_run(render, common));
     if (*check_verb) return flushed(effuse::check(check, common));
     if (*info_verb) return flushed(effuse::info(files, common));
     if (*import_verb) return flushed(effuse::import_terrain_file(import, common));
-    if (*effects_verb) return flushed(effuse::effects(common));
+    if (*effects_verb) return flushed(effuse::effects(effects, common));
     if (*skin_verb) return flushed(effuse::skin_particles(skin, common));
+    if (*view_verb) return flushed(effuse::view(view, common));
+    if (*export_verb) return flushed(effuse::export_run(exports, common));
     if (*study_verb) return flushed(effuse::run_studies(study, common));
   } catch (const effuse::InputError& error) {
     return report(ExitCode::kBadInput, error.faults(), common.json);

@@ -1,6 +1,7 @@
 #include "samples/effuse/progress.h"
 
 #include <fmt/format.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -34,7 +35,9 @@ std::string Progress::line(int frame, const std::string& status) const {
   const int done = frame - first_, left = frames_ - frame;
   // Frames grow dearer as the lava does: the estimate is a floor, and says so.
   const std::string eta = done > 0 && left > 0 ? fmt::format(", {} left or more", duration(elapsed / done * left)) : "";
-  return fmt::format("frame {:4} of {}: {}, {} so far{}", frame, frames_, status, duration(elapsed), eta);
+  rusage usage{};
+  ::getrusage(RUSAGE_SELF, &usage);
+  return fmt::format("frame {:4} of {}: {}, {:.0f} MB, {} so far{}", frame, frames_, status, static_cast<double>(usage.ru_maxrss) / 1000, duration(elapsed), eta);
 }
 
 void Progress::tick(const std::string& status) {

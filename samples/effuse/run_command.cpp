@@ -1,15 +1,9 @@
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
 #include <sys/resource.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <csignal>
 #include <cstdio>
-#include <cstring>
 #include <new>
 #include <nlohmann/json.hpp>
 #include <map>
@@ -19,13 +13,21 @@
 #include "geometry/base/log.h"
 #include "geometry/base/parallel.h"
 #include "geometry/base/zones.h"
+#include "importers/scene/scene_file.h"
+#include "samples/effuse/accuracy_report.h"
 #include "samples/effuse/body_writer.h"
+#include "samples/effuse/branch.h"
 #include "samples/effuse/commands.h"
+#include "samples/effuse/cost.h"
 #include "samples/effuse/flow_writer.h"
 #include "samples/effuse/frame_writer.h"
+#include "samples/effuse/handoff.h"
 #include "samples/effuse/load_scene.h"
+#include "samples/effuse/output_folder.h"
 #include "samples/effuse/progress.h"
 #include "samples/effuse/remove_run.h"
+#include "samples/effuse/stop_signals.h"
+#include "samples/effuse/trouble.h"
 
 namespace effuse {
 
@@ -36,82 +38,32 @@ namespace {
 
 constexpr double kUnsolvedShare = 0.05;  // of the steps: more are worth a word
 
-volatile std::sig_atomic_t g_interrupted = 0;  // a signal handler may touch nothing else
-
-/// First Ctrl-C: finish the step, checkpoint, say how to go on. Second: the default, at once.
-void on_interrupt(int signal) {
-  g_interrupted = 1;
-  std::signal(signal, SIG_DFL);
-}
-
-/// Signals while a run writes: the ones that ask it to end checkpoint first, and a log that nobody reads any more
-/// (| head, a terminal that closed) does not end it.
-class Signals {
- public:
-  Signals() {
-    g_interrupted = 0;
-    for (std::size_t k = 0; k < std::size(kStops); ++k) {
-      old_[k] = std::signal(kStops[k], on_interrupt);
-      if (kStops[k] == SIGHUP && old_[k] == SIG_IGN) std::signal(SIGHUP, SIG_IGN);  // nohup
-    }
-    old_pipe_ = std::signal(SIGPIPE, SIG_IGN);
-  }
-  ~Signals() {
-    for (std::size_t k = 0; k < std::size(kStops); ++k) std::signal(kStops[k], old_[k]);
-    std::signal(SIGPIPE, old_pipe_);
-  }
-
- private:
-  static constexpr int kStops[] = {SIGINT, SIGTERM, SIGHUP};
-  void (*old_[std::size(kStops)])(int);
-  void (*old_pipe_)(int);
-};
-
-/// The folder to write, made and held against a second run: two would mix their frames.
-class OutputFolder {
- public:
-  explicit OutputFolder(const fs::path& folder) {
-    const Place place{folder.string()};
-    std::error_code error;
-    if (fs::is_directory(folder, error)) {
-      if (::access(folder.c_str(), W_OK | X_OK) != 0) throw InputError(place, fmt::format("cannot be written to: {}", std::strerror(errno)));
-    } else {
-      if (fs::exists(fs::symlink_status(folder, error))) throw InputError(place, "is not a folder, wanted one to write the run to");
-      fs::create_directories(folder, error);
-      if (error == std::errc::no_space_on_device) throw ResourceError(fmt::format("{}: cannot make the folder: {}", folder.string(), error.message()));
-      if (error) throw InputError(place, "cannot make this folder: " + error.message());
-    }
-    fd_ = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    // Where locks are not to be had, it has to go without.
-    if (fd_ >= 0 && ::flock(fd_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
-      ::close(fd_);
-      throw InputError(place, "another effuse is writing to this folder; wait for it, or name another with -o");
-    }
-  }
-  ~OutputFolder() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  OutputFolder(const OutputFolder&) = delete;
-  OutputFolder& operator=(const OutputFolder&) = delete;
-
- private:
-  int fd_ = -1;
-};
-
 /// What run.json says: figures of the frames made, by this call and the ones it resumed.
 class RunRecord {
  public:
-  RunRecord(const LoadedScene& loaded, fs::path folder) : loaded_(loaded), folder_(std::move(folder)) {}
+  RunRecord(const LoadedScene& loaded, fs::path folder) : loaded_(loaded), folder_(std::move(folder)) {
+    if (!loaded.forecast) return;
+    const budget::Machine machine = budget::known_machine(machine_);
+    cost_ = cost_of(loaded, machine);
+  }
 
-  /// Keeps the hashes of frames 1..last of an earlier run.json, when it is of the same scene.
-  void read(int last) {
+  /// Keeps the hashes of frames 1..last of an earlier run.json, when it is of the same scene: by its scene_key, this one's or that given.
+  void read(int last, const std::string& scene_key = {}) {
     try {
       const ordered_json old = ordered_json::parse(read_file(folder_ / "run.json"));
-      if (old.at("scene_key") != loaded_.key) throw std::runtime_error("of another scene");
+      if (old.at("scene_key") != (scene_key.empty() ? loaded_.key : scene_key)) throw std::runtime_error("of another scene");
       for (const ordered_json& frame : old.at("frames"))
         if (frame.at("frame").get<int>() <= last) frames_.push_back(frame);
       earlier_s_ = old.at("seconds").get<double>();
+      if (old.contains("accuracy")) {
+        const ordered_json& came = old.at("accuracy").at("came_to");
+        earlier_steps_s_ = came.at("seconds").get<double>();
+        earlier_processor_s_ = came.at("processor_seconds").get<double>();
+      }
       if (old.contains("skin") && old.at("skin").at("frame").get<int>() <= last) skin_ = old.at("skin");
+      if (old.contains("branches"))
+        for (const ordered_json& each : old.at("branches"))
+          if (each.at("from_frame").get<int>() <= last + 1) branches_.push_back(each);
     } catch (const std::exception&) {
       frames_ = ordered_json::array();
       log_warning(fmt::format("{} is missing, damaged or of another scene: the hashes of the frames up to {} are not in the new one", (folder_ / "run.json").string(), last));
@@ -135,6 +87,11 @@ class RunRecord {
              {"held_back_vertices", result.held_back}};
   }
 
+  /// The frames from this one on are of another scene than those before, which is kept under that name.
+  void add_branch(int from_frame, const std::vector<std::string>& changes, const std::string& scene_before) {
+    branches_.push_back({{"from_frame", from_frame}, {"changes", changes}, {"scene_before", scene_before}});
+  }
+
   ordered_json document(const flow::Simulation& simulation, const Profile& profile, const std::string& outcome) const {
     ordered_json j;
     j["effuse"] = EFFUSE_VERSION;
@@ -156,10 +113,28 @@ class RunRecord {
     }
     for (const ZoneRow& row : profile.zones()) j["zones"][row.name] = {{"self_s", row.self_s}, {"total_s", row.total_s}, {"calls", row.calls}};
     for (const CounterRow& row : profile.counters()) j["counters"][row.name] = row.value;
+    if (loaded_.forecast) {
+      j["accuracy"] = ordered_json::parse(accuracy_json(*loaded_.forecast, cost_, machine_));
+      j["accuracy"]["came_to"] = ordered_json::parse(came_to_json(outcome_of(profile)));
+    }
     if (!skin_.empty()) j["skin"] = skin_;
+    if (!branches_.empty()) j["branches"] = branches_;
     j["frames"] = frames_;
     return j;
   }
+
+  /// What this run, and those it went on from, have taken so far: without the rehearsals.
+  CameTo outcome_of(const Profile& profile) const {
+    CameTo c = came_to(loaded_, folder_);
+    rusage usage{};
+    ::getrusage(RUSAGE_SELF, &usage);
+    const auto seconds = [](const timeval& t) { return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec); };
+    c.seconds = earlier_steps_s_ + profile.elapsed_s() - loaded_.rehearsal_seconds;
+    c.processor_seconds = earlier_processor_s_ + seconds(usage.ru_utime) + seconds(usage.ru_stime) - loaded_.rehearsal_processor_seconds;
+    c.memory = 1024.0 * static_cast<double>(usage.ru_maxrss);
+    return c;
+  }
+  const Cost& cost() const { return cost_; }
 
   void write(const ordered_json& document) const { write_file(folder_ / "run.json", document.dump(1, ' ', false, ordered_json::error_handler_t::replace) + "\n"); }
 
@@ -167,8 +142,11 @@ class RunRecord {
   const LoadedScene& loaded_;
   fs::path folder_;
   ordered_json frames_ = ordered_json::array();
+  ordered_json branches_ = ordered_json::array();
   ordered_json skin_;  // of the last frame with one
-  double earlier_s_ = 0;
+  double earlier_s_ = 0, earlier_steps_s_ = 0, earlier_processor_s_ = 0;  // the last two without rehearsals
+  Cost cost_;            // predicted, where the scene says how right it is to be
+  std::string machine_;  // where the figures for it come from
 };
 
 /// A name for the output folder when none is given: out/ and the scene's.
@@ -222,6 +200,22 @@ bool go_on(const fs::path& folder, LoadedScene& loaded, FlowWriter& flow_writer,
   return false;
 }
 
+/// The state after that frame of the folder's run, to go on from with the scene as it is now; the scene before is kept beside the new one.
+void branch(const fs::path& folder, int last, LoadedScene& loaded, FlowWriter& flow_writer, BodyWriter& body_writer, RunRecord& record) {
+  const std::vector<std::string> changes = changes_between(importers::read_scene_file(folder / "scene.toml"), importers::read_scene_text(loaded.resolved, "the scene"));
+  const fs::path checkpoint = checkpoint_after(folder, last);
+  const std::string key = loaded.simulation->branch(read_file(checkpoint), checkpoint.string());
+  if (!body_writer.restore()) throw InputError(Place{(folder / "bodies.csv").string()}, "is missing, damaged or shorter than the checkpoint; --force starts anew");
+  if (!flow_writer.restore(key))
+    throw InputError(Place{checkpoint.string()}, "has no sound record of the maps and flow.csv beside it (flow.*.state): --set output.maps=false --set output.series=false goes on without them");
+  const std::string before = fmt::format("scene.until-{:04}.toml", last);
+  record.read(last, key);
+  record.add_branch(last + 1, changes, before);
+  write_file(folder / before, read_file(folder / "scene.toml"));
+  for (const std::string& change : changes) log_info("from frame " + std::to_string(last + 1) + " on " + change);
+  if (changes.empty()) log_warning("the scene is the one that the frames before were made with: the frames will be the same");
+}
+
 }  // namespace
 
 ExitCode run(const RunCommand& command, const CommonOptions& common) {
@@ -231,6 +225,8 @@ ExitCode run(const RunCommand& command, const CommonOptions& common) {
   const flow::Scene& scene = loaded->scene;
   flow::Simulation& simulation = *loaded->simulation;
   for (const std::string& note : loaded->notes) log_info("terrain: " + note);
+  if (loaded->forecast)
+    for (const auto& [name, text] : told(*loaded->forecast)) log_info(name + ": " + text);
   double particles = 0;
   for (const flow::EffectPlan& plan : scene.effects) particles += plan.estimate.particles;
   const bool lava = std::any_of(simulation.effects().begin(), simulation.effects().end(), [](const auto& effect) { return effect->spacing() > 0; });
@@ -239,9 +235,9 @@ ExitCode run(const RunCommand& command, const CommonOptions& common) {
   const fs::path folder = command.folder.empty() ? default_folder(command.scene) : command.folder;
   std::error_code no_folder;
   const bool was_there = fs::exists(folder / "scene.toml", no_folder);
-  if (was_there && !command.resume && !command.force)
-    throw InputError(Place{folder.string()}, "holds a run already: --resume goes on with it, --force starts anew, -o names another folder");
-  if (command.resume && !was_there)
+  if (was_there && !command.resume && !command.force && command.from_frame == 0)
+    throw InputError(Place{folder.string()}, "holds a run already: --resume goes on with it, --from-frame goes on differently, --force starts anew, -o names another folder");
+  if ((command.resume || command.from_frame > 0) && !was_there)
     throw InputError(Place{folder.string()}, fmt::format("{}, so there is nothing to go on with: without --resume a run starts{}", fs::exists(folder, no_folder) ? "holds no run" : "does not exist",
                                                          command.folder.empty() ? "; -o names the folder when it is another" : ""));
 
@@ -256,20 +252,29 @@ ExitCode run(const RunCommand& command, const CommonOptions& common) {
     } else {
       log_info("no checkpoint yet: starting from the first frame");
     }
+  } else if (command.from_frame > 0) {
+    if (scene.frames < command.from_frame) throw InputError(Place{"--from-frame"}, fmt::format("is {}, the film has {} frames", command.from_frame, scene.frames));
+    branch(folder, command.from_frame - 1, *loaded, flow_writer, body_writer, record);
   } else if (was_there) {
     remove_run(folder);
   }
 
   FrameWriter writer(scene, loaded->skin, *loaded->terrain, loaded->solids, folder);
-  write_file(folder / "scene.toml", loaded->resolved);
   writer.write_terrain();
+  // From the start, so that a run that is cut off can be opened.
+  write_handoff_scripts(folder);
+  if (std::error_code ignored; !fs::exists(folder / "manifest.json", ignored)) writer.write_manifest(simulation.frame(), {});
 
-  std::optional<Signals> signals(std::in_place);
+  std::optional<StopSignals> signals(std::in_place);
   Progress progress(simulation.frame(), scene.frames, common.quiet);
   const auto status = [&] {
     std::string text;
-    for (const auto& effect : simulation.effects()) text += (text.empty() ? "" : "; ") + effect->status();
-    return text;
+    double now = simulation.time();
+    for (const auto& effect : simulation.effects()) {
+      text += (text.empty() ? "" : "; ") + effect->status();
+      now = std::max(now, effect->time());
+    }
+    return fmt::format("{:.4g} s, {}", now, text);
   };
 
   const auto written = [&] {
@@ -282,9 +287,18 @@ ExitCode run(const RunCommand& command, const CommonOptions& common) {
   const auto save_state = [&] {
     body_writer.write_series();
     flow_writer.save_record();
-    flow::write_checkpoint(folder, simulation, loaded->key);
+    flow::write_checkpoint(folder, simulation, loaded->key, static_cast<std::size_t>(loaded->skin.keep_checkpoints));
     flow_writer.remove_old_records();
   };
+
+  if (command.from_frame > 0) {
+    // From here to the checkpoint saved below a crash leaves the run before, shorter.
+    remove_frames_from(folder, command.from_frame);
+    record.write(record.document(simulation, profile, "running"));
+    save_state();
+    writer.write_manifest(simulation.frame(), written());
+  }
+  write_file(folder / "scene.toml", loaded->resolved);
 
   std::string outcome = "done";
   ExitCode code = ExitCode::kDone;
@@ -292,7 +306,7 @@ ExitCode run(const RunCommand& command, const CommonOptions& common) {
     while (simulation.frame() < scene.frames) {
       const bool whole = simulation.advance([&] {
         progress.tick(status());
-        return g_interrupted == 0;
+        return !StopSignals::asked();
       });
       if (!whole) {
         outcome = "interrupted";
@@ -309,6 +323,7 @@ ExitCode run(const RunCommand& command, const CommonOptions& common) {
         record.write(record.document(simulation, profile, "running"));
         save_state();
         flow_writer.write_series();
+        writer.write_collections(simulation.frame());
         writer.write_manifest(simulation.frame(), written());
       }
     }
@@ -324,6 +339,7 @@ ExitCode run(const RunCommand& command, const CommonOptions& common) {
     code = ExitCode::kUnstable;
     record.write(record.document(simulation, profile, outcome));
     save_state();  // as before the step that failed
+    for (const std::string& line : write_trouble(folder, command.scene, *loaded, error)) log_warning(line);
   } catch (const std::exception& error) {
     const bool full = dynamic_cast<const ResourceError*>(&error) || dynamic_cast<const std::bad_alloc*>(&error);
     progress.end();
@@ -343,6 +359,7 @@ ExitCode run(const RunCommand& command, const CommonOptions& common) {
     const std::string text = command.stats ? "\n" + profile.table() + "\n" : fmt::format("took {} (--stats lists all)\n", summary(profile));
     std::fwrite(text.data(), 1, text.size(), stderr);
   }
+  if (loaded->forecast && code == ExitCode::kDone) log_info(beside(*loaded->forecast, record.cost(), record.outcome_of(profile)));
 
   for (const auto& effect : simulation.effects()) {
     std::map<std::string, double> figures;

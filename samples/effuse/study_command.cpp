@@ -6,7 +6,10 @@
 
 #include "geometry/base/files.h"
 #include "geometry/base/log.h"
+#include "samples/budget/machine.h"
+#include "samples/effuse/calibrate.h"
 #include "samples/effuse/commands.h"
+#include "samples/study/cost/cheapest_table.h"
 #include "samples/study/page.h"
 #include "samples/study/run_study.h"
 #include "samples/study/study.h"
@@ -50,12 +53,55 @@ void print_list(const std::vector<Study>& chosen, const CommonOptions& common) {
   if (common.json) print_document(j.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
 }
 
+ExitCode measure_machine(const StudyCommand& command, const CommonOptions& common) {
+  if (!command.names.empty() || !command.cases.empty()) throw InputError(Place{}, "--calibrate measures the machine and runs no study: leave the names out");
+  if (budget::machine_file().empty()) throw InputError(Place{}, "nowhere to keep the machine's figures: the environment has neither XDG_CACHE_HOME nor HOME");
+  const budget::Machine machine = calibrate([&](const std::string& what) {
+    if (!common.quiet) say(fmt::format("measuring {}\n", what));
+  });
+  budget::keep(machine);
+  if (common.json) {
+    print_document(budget::machine_json(machine));
+    return ExitCode::kDone;
+  }
+  fmt::print("{}\n", machine.name);
+  fmt::print("  a particle and step     {:.2f} us, and {:.1f} ns a neighbour\n", 1e6 * machine.particle_step, 1e9 * machine.pair_step);
+  fmt::print("  an iteration            {:.1f} ns of a particle and {:.2f} ns a neighbour for pressure, {:.1f} and {:.2f} for viscosity\n", 1e9 * machine.pressure_particle, 1e9 * machine.pressure_pair, 1e9 * machine.viscosity_particle, 1e9 * machine.viscosity_pair);
+  fmt::print("  classic                 {:.1f} ns a neighbour and step\n", 1e9 * machine.classic_pair);
+  fmt::print("  threads                 {} step {:.2f} times as fast as one\n", machine.threads, machine.speedup);
+  fmt::print("  skin                    {:.0f} us a particle and frame\n", 1e6 * machine.skin_particle);
+  fmt::print("  files                   {:.0f} MB/s\n", 1e-6 / machine.write_byte);
+  fmt::print("  pictures                {:.2f} us a pixel\n", 1e6 * machine.picture_pixel);
+  log_info(fmt::format("kept in {}", budget::machine_file().string()));
+  return ExitCode::kDone;
+}
+
+/// Of all studies asked for that the folder holds.
+ExitCode print_cheapest(const StudyCommand& command) {
+  const std::filesystem::path folder = command.folder.empty() ? std::filesystem::path("out") / "study" : command.folder;
+  std::vector<study::CaseCosts> cases;
+  for (const Study& one : studies()) {
+    if (!command.names.empty() && std::find(command.names.begin(), command.names.end(), one.name) == command.names.end()) continue;
+    const std::filesystem::path file = folder / (one.name + "-costs.csv");
+    std::error_code error;
+    if (!std::filesystem::exists(file, error)) continue;
+    for (study::CaseCosts& costs : study::read_costs(read_file(file), file.string())) cases.push_back(std::move(costs));
+  }
+  if (cases.empty()) throw InputError(Place{folder.string()}, "holds no costs of a study: `effuse study integrators lava -o " + folder.string() + "` writes them");
+  if (!command.cases.empty()) std::erase_if(cases, [&](const study::CaseCosts& c) { return std::find(command.cases.begin(), command.cases.end(), c.name) == command.cases.end(); });
+  constexpr double kErrors[] = {0.1, 0.03, 0.01, 0.003};
+  fmt::print("{}", study::cheapest_table(cases, kErrors));
+  return ExitCode::kDone;
+}
+
 }  // namespace
 
 ExitCode run_studies(const StudyCommand& command, const CommonOptions& common) {
+  if (command.calibrate) return measure_machine(command, common);
   std::vector<std::string> names, case_names;
   for (const Study& one : studies()) names.push_back(one.name);
   study::require_known("study", command.names, names);
+  if (command.cheapest) return print_cheapest(command);
   std::vector<Study> chosen = studies();
   if (!command.names.empty()) std::erase_if(chosen, [&](const Study& one) { return std::find(command.names.begin(), command.names.end(), one.name) == command.names.end(); });
   if (command.list) {

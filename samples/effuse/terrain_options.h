@@ -5,7 +5,7 @@
 
 namespace effuse {
 
-/// How the importers are to read the ground of a scene.
+/// How the importers are to read ground as settings say: those of a scene, or of `effuse import`.
 inline importers::TerrainImportOptions terrain_options(const flow::TerrainSettings& s, const importers::ReadLimits& limits = {}) {
   importers::TerrainImportOptions options;
   options.temperature = s.temperature;
@@ -15,7 +15,7 @@ inline importers::TerrainImportOptions terrain_options(const flow::TerrainSettin
   dem.file_crs = s.file_crs;
   dem.crop = s.crop;
   dem.spacing = s.spacing;
-  // Both lists have the same names in the same order.
+  // Lists of choices have the same names in the same order.
   dem.resampling = static_cast<importers::Resampling>(s.resample);
   dem.holes = static_cast<importers::HolePolicy>(s.holes);
   dem.pits = static_cast<importers::PitPolicy>(s.pits);
@@ -23,6 +23,13 @@ inline importers::TerrainImportOptions terrain_options(const flow::TerrainSettin
   dem.pit_depth = s.pit_depth;
   dem.size = s.size;
   dem.range = s.range;
+  options.mesh.up = static_cast<importers::UpAxis>(s.up);
+  options.mesh.metres_per_unit = s.metres_per_unit;
+  options.repair = s.repair;
+  if (s.stitch > 0) options.repairs.stitch = s.stitch;
+  options.repairs.fill_holes = s.fill_holes;
+  options.max_error = s.max_error;
+  options.edge = s.edge;
   return options;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 #include <numeric>
+#include <set>
 
 #include "geometry/mesh/measure.h"
 #include "skin/preview/ground_texture.h"
@@ -86,9 +87,66 @@ std::vector<Edge> facing_outward(const TriMesh& mesh, const std::vector<Edge>& b
   return facing;
 }
 
+/// The border of ground that hangs over runs back under itself, as seen from the centre, and an apron there would be folded, with a side that
+/// faces down. Such a stretch is left out, and a wall drawn from its upper end to where the border comes out below it; what runs forward
+/// below the roof is the floor of the hollow.
+struct Outline {
+  std::vector<Edge> edges;
+  std::set<Edge> under_roof;
+};
+
+Outline without_folds(const TriMesh& mesh, std::vector<Edge> border) {
+  constexpr Real kFold = 0.01;  // [rad] less is a rim that is not quite straight
+  std::map<Index, Index> next;
+  for (const Edge& e : border) next[e[0]] = e[1];
+  // In the border's order, with angles that go on past a whole turn.
+  std::vector<Index> chain;
+  std::vector<Real> angle;
+  const auto direction = [&](Index v) { return std::atan2(mesh.positions[v].y(), mesh.positions[v].x()); };
+  for (Index v = border.front()[0]; chain.size() <= border.size(); v = next[v]) {
+    if (!next.contains(v)) return {std::move(border), {}};
+    angle.push_back(chain.empty() ? direction(v) : angle.back() + std::remainder(direction(v) - direction(chain.back()), 2 * kPi));
+    chain.push_back(v);
+    if (chain.size() > 1 && v == chain.front()) break;
+  }
+  const std::size_t n = chain.size() - 1;
+  if (chain.back() != chain.front() || std::abs(angle.back() - angle.front() - 2 * kPi) > 0.1) return {std::move(border), {}};
+  // Three rounds: a fold may lie across the start.
+  for (std::size_t k = n + 1; k < 3 * n; ++k) {
+    chain.push_back(chain[k - n]);
+    angle.push_back(angle[k - n] + 2 * kPi);
+  }
+
+  std::vector<Edge> walls;
+  std::set<Edge> folded, under_roof;
+  for (std::size_t first = n; first < 2 * n; ++first) {
+    if (!(angle[first + 1] < angle[first]) || angle[first] < angle[first - 1]) continue;
+    std::size_t last = first + 1;
+    while (angle[last + 1] <= angle[last]) ++last;
+    if (angle[first] - angle[last] < kFold) continue;
+    for (std::size_t k = first; k < last; ++k) folded.insert({chain[k], chain[k + 1]});
+    const bool upper_first = mesh.positions[chain[first]].z() > mesh.positions[chain[last]].z();
+    std::size_t below = upper_first ? last : first;
+    if (upper_first) {
+      while (angle[below] <= angle[first]) ++below;
+      walls.push_back({chain[first], chain[below]});
+    } else {
+      while (angle[below] >= angle[last]) --below;
+      walls.push_back({chain[below], chain[last]});
+    }
+    for (std::size_t k = upper_first ? last : below; k < (upper_first ? below : first); ++k) under_roof.insert({chain[k], chain[k + 1]});
+  }
+  std::erase_if(border, [&](const Edge& e) { return folded.contains(e); });
+  border.insert(border.end(), walls.begin(), walls.end());
+  return {std::move(border), std::move(under_roof)};
+}
+
 /// Appends the apron to mesh (whose centre is the origin).
 void add_apron(TriMesh& mesh, Real radius, Real base) {
-  const std::vector<Edge> edges = facing_outward(mesh, outer_border(mesh));
+  std::vector<Edge> border = outer_border(mesh);
+  if (border.empty()) return;
+  const Outline outline = without_folds(mesh, std::move(border));
+  const std::vector<Edge> edges = facing_outward(mesh, outline.edges);
   if (edges.empty()) return;
 
   // The border's vertices and their neighbours along it.
@@ -97,7 +155,11 @@ void add_apron(TriMesh& mesh, Real radius, Real base) {
     for (const Index v : e) slot.emplace(v, slot.size());
   const std::size_t n = slot.size();
   std::vector<std::array<std::size_t, 2>> links;
-  for (const Edge& e : edges) links.push_back({slot[e[0]], slot[e[1]]});
+  std::vector<char> hollow;
+  for (const Edge& e : edges) {
+    links.push_back({slot[e[0]], slot[e[1]]});
+    hollow.push_back(outline.under_roof.contains(e));
+  }
   std::vector<Vec3> start(n);
   for (const auto& [v, s] : slot) start[s] = mesh.positions[v];
   std::vector<Real> height(n), blurred(n), count(n);
@@ -135,7 +197,10 @@ void add_apron(TriMesh& mesh, Real radius, Real base) {
       next[s] = static_cast<Index>(mesh.positions.size());
       mesh.positions.emplace_back(plane.x(), plane.y(), z);
     }
-    for (const auto& [a, b] : links) {
+    for (std::size_t l = 0; l < links.size(); ++l) {
+      const auto& [a, b] = links[l];
+      // Where roof and floor have both come down to the base, one of them is drawn.
+      if (hollow[l] && d > 0.4 * radius) continue;
       mesh.triangles.push_back({ring[b], ring[a], next[a]});
       mesh.triangles.push_back({ring[b], next[a], next[b]});
     }

@@ -21,7 +21,8 @@ struct Ground {
 
 /// Apron: every border edge of the terrain's largest border, where it faces outward, goes on away from the centre in
 /// rings out to sixty radii, its height easing from the border's to the lowest border height within half a radius, with
-/// low made-up hills from there. A terrain without border (closed, or empty) gets the floor alone.
+/// low made-up hills from there. Where the terrain hangs over at its border, roof and floor of the hollow go on for a while, with a wall
+/// between them. A terrain without border (closed, or empty) gets the floor alone.
 /// Normals: by angle, smoothed twice over their neighbours, which hides the steps of a DEM in whole metres.
 /// An open terrain whose triangles mostly face down is drawn turned over. Throws InputError when the terrain is not well
 /// formed.

@@ -31,6 +31,10 @@ constexpr unsigned kGroundId = 0, kLavaId = 1;
 constexpr int kPacket = 8;
 constexpr float kMoltenGloss = 0.5f;
 constexpr float kShadowLift = 0.1f;  // [terrain edges] what is lower casts no shadow of the ground's
+// Root mean square slope, each way, of ripples too short for a water's mesh: that of a light air, by Cox and Munk 1954, J. Opt. Soc. Am. 44, 838-850.
+constexpr float kRipples = 0.06f;
+constexpr float kBrightest = 3;  // of what they mirror; white paper in the sun is 1: few facets that meet molten lava are grain
+constexpr int kFacets = 3;  // of them that a sample meets
 constexpr float kFar = std::numeric_limits<float>::infinity();
 
 struct ReleaseDevice {
@@ -378,26 +382,20 @@ struct Picture {
     return surface_at(hit.hit.geomID, hit.hit.primID, hit.hit.u, hit.hit.v, p + way * d, before + way, d, Vec3f(hit.hit.Ng_x, hit.hit.Ng_y, hit.hit.Ng_z));
   }
 
-  /// Water: Fresnel's mirror of one bounce, and down through it what lies there, red fading first; the body's own colour by the light
-  /// that falls in.
-  Vec3f water_light(const Surface& s, const Vec3f& d, bool lit) const {
+  /// Water: Fresnel's mirror of one bounce, on facets of ripples, and down through it what lies there, red fading first; the body's own
+  /// colour by the light that falls in. facets: slopes beyond the mesh's.
+  Vec3f water_light(const Surface& s, const Vec3f& d, bool lit, const std::array<Eigen::Vector2f, kFacets>& facets) const {
     // Smooth normals lean away from the viewer at a crest's edge: they are turned back until it is seen at a slant.
     constexpr float kSlant = 0.03f;
-    Vec3f n = s.normal;
-    if (const float away = n.dot(d) + kSlant; away > 0) n = (n - away * d).normalized();
+    const auto seen_from_here = [&](const Vec3f& normal) {
+      const float away = normal.dot(d) + kSlant;
+      return away > 0 ? Vec3f((normal - away * d).normalized()) : normal;
+    };
+    const Vec3f n = seen_from_here(s.normal);
     const float lift = 1e-4f * s.distance + 1e-4f * ground.radius, cosine = saturate(-n.dot(d));
-    const float out = 1 - cosine, o2 = out * out, fresnel = 0.02f + 0.98f * o2 * o2 * out;
     float way = 0;
-    Vec3f mirrored = d - 2 * d.dot(n) * n;
-    mirrored.z() = std::max(mirrored.z(), 0.02f);
-    mirrored.normalize();
-    const Surface above = second(s.position + lift * s.geometric, mirrored, s.distance, lift, way);
-    const Vec3f body = s.albedo.cwiseProduct(sky.ambient(Vec3f::UnitZ()) + (lit ? 0.5f : 0.0f) * std::max(0.0f, sky.sun_direction().z()) * sky.sun_light() / static_cast<float>(kPi));
-    // Other waves show the sky, too, from higher up.
-    Vec3f onward = mirrored;
-    onward.z() += 0.25f;
-    const Vec3f reflection = !above.hit ? sky.radiance(mirrored) : above.water > 0 ? Vec3f(mix(body, sky.radiance(onward.normalized()), 0.7f)) : radiance(above, mirrored, true);
     // Snell's law, air to water.
+    const Vec3f body = s.albedo.cwiseProduct(sky.ambient(Vec3f::UnitZ()) + (lit ? 0.5f : 0.0f) * std::max(0.0f, sky.sun_direction().z()) * sky.sun_light() / static_cast<float>(kPi));
     const float eta = 1 / 1.33f, inner = std::sqrt(std::max(0.0f, 1 - eta * eta * (1 - cosine * cosine)));
     const Vec3f down = (eta * d + (eta * cosine - inner) * n).normalized();
     const Surface below = second(s.position - lift * s.geometric, down, s.distance, lift, way);
@@ -406,12 +404,27 @@ struct Picture {
       const Vec3f through = (Vec3f(1.9f, 0.95f, 0.8f) * (-way / s.water)).array().exp();
       seen = through.cwiseProduct(radiance(below, down, true)) + (Vec3f::Ones() - through).cwiseProduct(body);
     }
-    Vec3f light = mix(seen, reflection, fresnel);
+    Vec3f light = Vec3f::Zero();
+    float mean_fresnel = 0;
+    for (const Eigen::Vector2f& slope : facets) {
+      const Vec3f facet = seen_from_here((s.normal + Vec3f(slope.x(), slope.y(), 0)).normalized());
+      const float out = 1 - saturate(-facet.dot(d)), o2 = out * out, fresnel = 0.02f + 0.98f * o2 * o2 * out;
+      Vec3f mirrored = d - 2 * d.dot(facet) * facet;
+      mirrored.z() = std::max(mirrored.z(), 0.02f);
+      mirrored.normalize();
+      const Surface above = second(s.position + lift * s.geometric, mirrored, s.distance, lift, way);
+      // Other waves show the sky, too, from higher up.
+      Vec3f onward = mirrored;
+      onward.z() += 0.25f;
+      const Vec3f reflection = !above.hit ? sky.radiance(mirrored) : above.water > 0 ? Vec3f(mix(body, sky.radiance(onward.normalized()), 0.7f)) : radiance(above, mirrored, true);
+      light += mix(seen, Vec3f(reflection.cwiseMin(kBrightest)), fresnel) / kFacets;
+      mean_fresnel += fresnel / kFacets;
+    }
     if (lit) {
-      // The sun, on ripples that the mesh does not have.
+      // The sun, on all of the ripples at once.
       const Vec3f half = (sky.sun_direction() - d).normalized();
-      const float h = std::max(0.0f, n.dot(half)), alpha2 = 0.003f, q = h * h * (alpha2 - 1) + 1;
-      light += sky.sun_light() * (0.08f * fresnel * alpha2 / (static_cast<float>(kPi) * q * q));
+      const float h = std::max(0.0f, n.dot(half)), alpha2 = 2 * kRipples * kRipples, q = h * h * (alpha2 - 1) + 1;
+      light += sky.sun_light() * (0.25f * mean_fresnel * alpha2 / (static_cast<float>(kPi) * q * q));
     }
     return through_air(s.distance, d, light);
   }
@@ -469,7 +482,7 @@ struct Picture {
         const Surface& s = surface[static_cast<std::size_t>(k)];
         const Vec3f& d = direction[static_cast<std::size_t>(k)];
         const bool lit = to_lava[k] != 0 && !(lava_shadow.tfar[k] < 0);
-        const Vec3f light = !s.hit ? sky.radiance(d) : s.water > 0 ? water_light(s, d, lit) : radiance(s, d, lit);
+        const Vec3f light = !s.hit ? sky.radiance(d) : s.water > 0 ? water_light(s, d, lit, facets_sample(first + k, x0, y)) : radiance(s, d, lit);
         if (depth && s.hit) {
           depth[2 * ((first + k) / samples)] += s.distance;
           depth[2 * ((first + k) / samples) + 1] += 1;
@@ -492,6 +505,21 @@ struct Picture {
   }
 
   /// A direction within the sun's disc, ten times as wide as the real one: soft shadows.
+  /// Slopes of facets of water's surface, of the ripples that a mesh does not have: normal, kRipples wide each way.
+  std::array<Eigen::Vector2f, kFacets> facets_sample(int sample, int x0, int y) const {
+    std::array<Eigen::Vector2f, kFacets> facets;
+    const std::uint64_t pixel = static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(options.width) + static_cast<std::uint64_t>(x0);
+    for (int k = 0; k < kFacets; ++k) {
+      const std::uint64_t bits = random_bits(options.seed + 2, pixel, static_cast<std::uint64_t>(sample) * kFacets + static_cast<std::uint64_t>(k));
+      const float r = static_cast<float>(bits >> 40) * 0x1p-24f, turn = static_cast<float>(bits >> 16 & 0xffffff) * 0x1p-24f;
+      // Of lengths and turns one of each share to a pixel: less grain.
+      const int n = kFacets * options.samples, i = sample % options.samples * kFacets + k;
+      const float length = kRipples * std::sqrt(-2 * std::log((static_cast<float>(i) + 1 - r) / static_cast<float>(n)));
+      const float angle = 2 * static_cast<float>(kPi) * (static_cast<float>(k) + turn) / kFacets;
+      facets[static_cast<std::size_t>(k)] = length * Eigen::Vector2f(std::cos(angle), std::sin(angle));
+    }
+    return facets;
+  }
   Vec3f sun_sample(int sample, int x0, int y) const {
     const std::uint64_t pixel = static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(options.width) + static_cast<std::uint64_t>(x0);
     const std::uint64_t bits = random_bits(options.seed + 1, pixel, static_cast<std::uint64_t>(sample));

@@ -45,6 +45,13 @@ struct PreviewOptions {
   std::uint64_t seed = 0;  ///< of the sample positions; the same for all frames, so that still ground does not shimmer
 };
 
+/// Light of a picture's sun and sky, linear, for other renderers' lamps: the irradiance of a surface that faces the sun, and the radiance of a white
+/// one that looks up and sees the sky alone (the sky's mean).
+struct Daylight {
+  Vec3 sun = Vec3::Zero(), sky = Vec3::Zero();
+};
+Daylight daylight(const PreviewOptions& options);
+
 /// Something small that is drawn by itself: a flake, a grain, a spark, a tongue of fire.
 ///   streak  how far it flies while the picture is taken [m]
 ///   color   linear light that it reflects; glow: that it gives off

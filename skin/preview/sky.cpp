@@ -1,5 +1,7 @@
 #include "skin/preview/sky.h"
 
+#include "skin/preview/preview.h"
+
 namespace effuse::skin {
 
 Sky::Sky(const Vec3& sun_direction, Real sun, Real sky) : sun_direction_(sun_direction.normalized().cast<float>()) {
@@ -26,6 +28,11 @@ Vec3f Sky::haze(const Vec3f& d) const {
   const float along = flat * sun_flat > 1e-6f ? (d.x() * sun_direction_.x() + d.y() * sun_direction_.y()) / (flat * sun_flat) : 0;
   const float toward = saturate(0.5f + 0.5f * along), t2 = toward * toward;
   return 0.97f * horizon_ + (0.5f * t2 * t2 * t2 * t2) * halo_;
+}
+
+Daylight daylight(const PreviewOptions& options) {
+  const Sky sky(options.sun_direction, options.sun, options.sky);
+  return {sky.sun_light().cast<Real>(), sky.ambient(Vec3f::UnitZ()).cast<Real>()};
 }
 
 }  // namespace effuse::skin

@@ -62,14 +62,21 @@ SkinSettings read_skin_settings(flow::Parameters& root) {
   if (detail.solid >= detail.molten) skin.fault("solid", "is not below molten");
 
   Parameters output = root.table("output", "what is written for each frame");
-  const std::vector<std::string> formats = {"ply", "obj", "glb", "vdb"};
-  const std::vector<std::size_t> wanted = output.choices("formats", formats, {0, 1, 2, 3}, "files of the skin");
+  const std::vector<std::string> formats = {"ply", "obj", "glb", "vdb", "vtp", "usda", "bgeo", "glb-flipbook"};
+  const std::vector<std::size_t> wanted = output.choices("formats", formats, {0, 1, 2, 3}, "files of the skin; bgeo: of the particles; glb-flipbook: one file of the film, made of ply or glb");
   const auto has = [&](std::size_t format) { return std::find(wanted.begin(), wanted.end(), format) != wanted.end(); };
   s.ply = has(0);
   s.obj = has(1);
   s.glb = has(2);
   s.vdb = has(3);
+  s.vtp = has(4);
+  s.usda = has(5);
+  s.bgeo = has(6);
+  s.flipbook = has(7);
+  if (s.flipbook && !s.ply && !s.glb) output.fault("formats", "glb-flipbook is made of the frames' ply or glb: wanted one of them beside it");
   s.checkpoint_every = static_cast<int>(output.integer("checkpoint_every", s.checkpoint_every, 1, 10000, "frames between two checkpoints"));
+  s.keep_checkpoints = static_cast<int>(output.integer("keep_checkpoints", s.keep_checkpoints, 0, 10000, "so many of the newest stay, 0: all; a run may be gone on with differently after any that is there"));
+  if (s.keep_checkpoints == 1) output.fault("keep_checkpoints", "is 1: wanted two at least, one to fall back on should the newest be damaged, or 0 for all");
   s.maps = output.flag("maps", s.maps, "maps/: largest thickness, highest temperature, arrival time, deposit");
   const std::vector<std::size_t> map_formats = output.choices("map_formats", {"tif", "asc"}, {0, 1}, "GeoTIFF, ESRI ASCII");
   s.map_tif = std::find(map_formats.begin(), map_formats.end(), std::size_t{0}) != map_formats.end();

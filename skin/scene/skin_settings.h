@@ -25,7 +25,10 @@ struct SkinSettings {
   LavaColorOptions color;
 
   bool ply = true, obj = true, glb = true, vdb = true;
+  bool vtp = false, usda = false, bgeo = false;
+  bool flipbook = false;       ///< made of ply or glb
   int checkpoint_every = 10;  ///< frames
+  int keep_checkpoints = 0;   ///< the newest so many; 0: all
   // For people who study flows: maps of the whole run, and a line of figures a frame.
   bool maps = true, map_tif = true, map_asc = true;
   Real map_cell = 0;           ///< side of a map's cell [m]; 0: the terrain's, over a mesh two particle spacings

@@ -7,8 +7,9 @@
 #include <vector>
 
 #include "geometry/mesh/tri_mesh.h"
+#include "skin/write/emission_ramp.h"
 
-/// A binary glTF 2.0 file as it grows: what write_glb and write_animated_glb have in common.
+/// A binary glTF 2.0 file as it grows: what write_glb, write_animated_glb and Flipbook have in common.
 namespace effuse::skin {
 
 using Json = nlohmann::ordered_json;
@@ -42,6 +43,8 @@ class GlbBuilder {
     return static_cast<int>(json["accessors"].size()) - 1;
   }
 
+  std::uint64_t bytes() const { return bin_.size(); }
+
   /// The whole file: header, JSON chunk padded with blanks, binary chunk (left out when empty) with zeros.
   /// Throws InputError when it would be longer than GLB can be.
   std::string file(const std::filesystem::path& name);
@@ -54,5 +57,21 @@ class GlbBuilder {
 int add_positions(GlbBuilder& glb, const std::vector<Vec3>& positions);
 int add_normals(GlbBuilder& glb, const std::vector<Vec3>& normals);
 int add_colors(GlbBuilder& glb, const geometry::VertexAttribute& color);
+int add_triangles(GlbBuilder& glb, const geometry::TriMesh& mesh);
+
+/// Attributes of a primitive: POSITION, NORMAL, COLOR_0 and all others in upper case, but "glow" of width 3, which becomes *glow and a ramp.
+/// Throws InputError (name) for those that glTF cannot hold. The mesh is well formed and has triangles.
+Json add_vertices(GlbBuilder& glb, const std::string& name, const geometry::TriMesh& mesh, const geometry::VertexAttribute** glow);
+
+/// TEXCOORD_0 of vertices with these places on a ramp.
+int add_ramp_coordinates(GlbBuilder& glb, const std::vector<float>& u);
+/// The ramp as the file's image, texture and sampler, and as what the material gives off; its strength is > 0.
+void add_ramp(GlbBuilder& glb, const EmissionRamp& ramp, Json& material);
+
+/// What lies in memory.
+template <class V>
+std::string bytes_of(const std::vector<V>& values) {
+  return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(V)};
+}
 
 }  // namespace effuse::skin

@@ -226,6 +226,8 @@ void write_output(const fs::path& file, std::string_view bytes) {
     write_file(file, bytes);
   } catch (const ResourceError&) {
     throw;
+  } catch (const InputError& error) {
+    throw InputError(place, fmt::format("cannot write a map here: {}", error.faults().front().message));
   } catch (const std::runtime_error& error) {
     throw InputError(place, fmt::format("cannot write a map here: {}", error.what()));
   }
@@ -343,14 +345,26 @@ void write_geotiff(const fs::path& file, const Raster& raster) {
 
 void write_esri_ascii(const fs::path& file, const Raster& raster) {
   ZONE("write.esri_ascii");
-  write_output(file, encode_esri_ascii(raster));
+  const std::string text = encode_esri_ascii(raster);
   const bool is_wkt = !root_keyword(compact(raster.crs)).empty();
   const std::string wkt = is_wkt ? raster.crs : utm_wkt(epsg_code(raster.crs).value_or(0));
-  fs::path prj = file;
-  prj.replace_extension(".prj");
+  const fs::path prj = fs::path(file).replace_extension(".prj");
   std::error_code ignored;
-  if (wkt.empty()) fs::remove(prj, ignored);
-  else write_output(prj, wkt + "\n");
+  if (wkt.empty()) {
+    write_output(file, text);
+    fs::remove(prj, ignored);
+    return;
+  }
+  // Both or none: the heights come last, and if there is no room for them the old system comes back.
+  const std::string before = fs::is_regular_file(prj, ignored) ? read_file(prj) : "";
+  write_output(prj, wkt + "\n");
+  try {
+    write_output(file, text);
+  } catch (...) {
+    if (before.empty()) fs::remove(prj, ignored);
+    else write_output(prj, before);
+    throw;
+  }
 }
 
 }  // namespace effuse::skin

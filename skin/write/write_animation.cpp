@@ -20,19 +20,13 @@ Eigen::Vector4f turned(const Quat& q, const Eigen::Vector4f& before) {
   return v.dot(before) < 0 ? Eigen::Vector4f(-v) : v;
 }
 
-template <class V>
-std::string bytes_of(const std::vector<V>& values) {
-  return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(V)};
-}
-
 int add_mesh(GlbBuilder& glb, const std::filesystem::path& file, const MovingMesh& thing) {
   require_well_formed(file.string() + ", " + thing.name, *thing.mesh);
   Json attributes;
   attributes["POSITION"] = add_positions(glb, thing.mesh->positions);
   attributes["NORMAL"] = add_normals(glb, unit_normals(*thing.mesh));
   if (const geometry::VertexAttribute* color = find_color(*thing.mesh)) attributes["COLOR_0"] = add_colors(glb, *color);
-  const int indices = glb.add_accessor({reinterpret_cast<const char*>(thing.mesh->triangles.data()), thing.mesh->triangles.size() * sizeof(geometry::Triangle)}, kIndexData, kUnsignedInt,
-                                       3 * thing.mesh->triangles.size(), "SCALAR");
+  const int indices = add_triangles(glb, *thing.mesh);
   glb.json["meshes"].push_back({{"name", thing.name}, {"primitives", Json::array({{{"attributes", attributes}, {"indices", indices}, {"material", 0}}})}});
   return static_cast<int>(glb.json["meshes"].size()) - 1;
 }

@@ -111,6 +111,7 @@ inline const std::vector<Package>& packages() {
       {"TBB", {"tbb/", "oneapi/"}, {"geometry/base", "skin"}},
       {"Embree", {"embree3/", "embree4/"}, {"skin"}},
       {"libpng", {"png.h"}, {"skin"}},
+      {"OpenEXR", {"Imf"}, {"skin"}},
       {"zlib", {"zlib.h"}, {"skin", "importers"}},
       {"assimp", {"assimp/"}, {"importers"}},
       {"GDAL", {"gdal", "ogr", "cpl_"}, {"importers"}},
@@ -127,7 +128,7 @@ inline const std::vector<Package>& packages() {
 /// Headers of C and of the system; <cstdint> and its like have no '.' and are told from packages by that.
 inline bool is_system_header(const std::string& name) {
   static const std::set<std::string> posix{"unistd.h", "fcntl.h", "signal.h", "dlfcn.h", "fenv.h", "immintrin.h", "pthread.h", "sched.h",
-                                           "poll.h", "malloc.h", "termios.h", "locale.h", "execinfo.h"};
+                                           "poll.h", "malloc.h", "termios.h", "locale.h", "execinfo.h", "spawn.h"};
   return starts_with(name, "sys/") || starts_with(name, "linux/") || posix.contains(name);
 }
 inline bool is_standard_header(const std::string& name) { return name.find_first_of("./") == std::string::npos; }

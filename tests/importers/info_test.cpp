@@ -20,6 +20,7 @@ std::string all(const std::filesystem::path& file) {
 TEST(DescribeFile, AVolcanoIsAGridWithOneDeepCrater) {
   const std::string text = all(EFFUSE_SOURCE_DIR "/samples/scenes/maunga-whau.asc");
   EXPECT_TRUE(contains(text, "61 x 87 posts, 10 x 10 m apart: 600 x 860 m")) << text;
+  EXPECT_TRUE(contains(text, "format: ESRI ASCII")) << text;
   EXPECT_TRUE(contains(text, "heights: 94 to 195 m")) << text;
   EXPECT_TRUE(contains(text, "holes: none")) << text;
   EXPECT_TRUE(contains(text, "New Zealand Map Grid (EPSG:27200)")) << text;
@@ -51,11 +52,20 @@ TEST(DescribeFile, AMeshTellsItsStateItsFaultsAndItsFrame) {
   const std::string crossed = "v 0 0 0\nv 4 0 0\nv 4 0 -4\nv 0 0 -4\nv 1 -1 -1\nv 3 -1 -1\nv 3 1 -1\nv 1 1 -1\nf 1 2 3\nf 1 4 3\nf 5 6 7 8\n";
   const std::filesystem::path file = folder.write("crossed.obj", crossed);
   const std::string text = all(file), values = file_facts(file).values;
-  for (const char* part : {"self-intersections: 3 pairs", "not oriented at 1 edge", "2 components", "up axis: the file does not say", "unit: the file does not say; metres are assumed"}) EXPECT_TRUE(contains(text, part)) << part << " in " << text;
+  for (const char* part : {"format: obj", "self-intersections: 3 pairs", "not oriented at 1 edge", "2 components", "up axis: the file does not say", "unit: the file does not say; metres are assumed"}) EXPECT_TRUE(contains(text, part)) << part << " in " << text;
   for (const char* part : {"\"kind\":\"mesh\"", "\"closed\":false", "\"oriented\":false", "\"misoriented_edges\":1", "\"self_intersections\":3", "\"degenerate_triangles\":0", "\"metres_per_unit\":null", "\"volume_m3\":null"})
     EXPECT_TRUE(contains(values, part)) << part << " in " << values;
   const std::string own = all(folder.write("own.obj", "# effuse, metres, z up\n# origin: 2667400 6478700 0\n# crs: EPSG:27200\n" + crossed));
   for (const char* part : {"up axis: z, by its comments", "unit: 1 m, by its comments", "origin on the map: 2667400, 6478700, 0"}) EXPECT_TRUE(contains(own, part)) << part << " in " << own;
+}
+
+TEST(DescribeFile, TrianglesWithoutNumberInOnePlaceTakeNoTime) {
+  const TestFolder folder;
+  std::string heap = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+  for (int k = 0; k < 20000; ++k) heap += "f 1 2 3\n";
+  const std::filesystem::path file = folder.write("heap.obj", heap);
+  EXPECT_TRUE(contains(all(file), fmt::format("self-intersections: {} or more pairs", kMostCrossings)));
+  EXPECT_TRUE(contains(file_facts(file).values, "\"self_intersections_or_more\":true"));
 }
 
 TEST(DescribeFile, ASceneTellsItsNameEffectsAndTables) {

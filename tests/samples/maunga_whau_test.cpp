@@ -90,7 +90,9 @@ TEST_F(MaungaWhau, LosesNoMassAndNoParticleUnderTheTerrain) {
   EXPECT_GT(lowest, -0.01 * lava().spacing()) << "of a spacing under the terrain";
 }
 
-TEST_F(MaungaWhau, SkinEnclosesTheParticlesVolumeWithinFivePercentAndStaysNearThem) {
+class MaungaWhauSlow : public MaungaWhau {};
+
+TEST_F(MaungaWhauSlow, SkinEnclosesTheParticlesVolumeWithinFivePercentAndStaysNearThem) {
   run(60, [&](int frame) {
     if (frame % 20 != 0) return;
     skin::LevelSetOptions options = loaded_->skin.level_set;
@@ -141,8 +143,6 @@ TEST(MaungaWhauRun, WritesRegionsAndTellsOfThemInRunJson) {
   EXPECT_EQ(load_scene(kScene, {"skin.coarsen=0.1"}, 1)->skin.coarsen, 0.1);
   fs::remove_all(folder);
 }
-
-class MaungaWhauSlow : public MaungaWhau {};
 
 TEST_F(MaungaWhauSlow, EveryKindOfSkinIsSoundInAFineFrame) {
   run(

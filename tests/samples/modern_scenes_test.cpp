@@ -100,10 +100,10 @@ TEST(EffectsVerb, ListsTheParametersOfEveryModelAndLaw) {
   }
   ASSERT_TRUE(with.contains("lava.heat.latent_heat"));
   EXPECT_EQ(with.at("lava.heat.latent_heat"), "");
-  EXPECT_EQ(with.at("lava.stiffness"), "model=classic");
-  EXPECT_EQ(with.at("lava.rheology.b"), "rheology.law=vft");
-  EXPECT_EQ(with.at("lava.rheology.oxides.sio2"), "rheology.law=grd08");
-  EXPECT_EQ(with.at("lava.rheology.yield.strength"), "rheology.yield.law=constant");
+  EXPECT_EQ(with.at("lava.stiffness"), "model = classic");
+  EXPECT_EQ(with.at("lava.rheology.b"), "preset = etna");
+  EXPECT_EQ(with.at("lava.rheology.oxides.sio2"), "law = grd08");
+  EXPECT_EQ(with.at("lava.rheology.yield.strength"), "law = constant");
 }
 
 }  // namespace

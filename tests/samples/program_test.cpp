@@ -391,7 +391,18 @@ TEST_F(ProgramTest, RunsBodiesWithoutLavaAndGoesOnToTheSameBytes) {
   ASSERT_EQ(effuse(arguments(parts, "1", {"--force"})).code, 0);
 }
 
-TEST_F(ProgramTest, WhatBreaksIsWrittenInPiecesAndGoesOnToTheSameBytes) {
+/// The real scene at full resolution, for 40 of its frames.
+class ProgramSlow : public ProgramTest {
+ protected:
+  static Arguments run_mountain(const fs::path& out, const Arguments& more = {}) {
+    Arguments arguments = {"run", kScenes / "maunga-whau.toml", "-o", out, "--frames", "40", "--set", "output.checkpoint_every=20", "--set", "preview.width=320", "--set",
+                           "preview.height=180", "--stats"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  }
+};
+
+TEST_F(ProgramSlow, WhatBreaksIsWrittenInPiecesAndGoesOnToTheSameBytes) {
   const auto run = [&](const fs::path& out, const char* frames, const Arguments& more = {}) {
     Arguments all = {"run", kScenes / "fracture.toml", "-o", out, "--frames", frames, "--quiet", "--set", "preview.pictures=false", "--set", "film.time_scale=1"};
     all.insert(all.end(), more.begin(), more.end());
@@ -465,10 +476,16 @@ TEST_F(ProgramTest, NamesWhatBlocksAVentWhenItCannotGoOn) {
   EXPECT_EQ(run.code, 4) << run.err;
   EXPECT_NE(run.err.find("obstacle 'ram', "), std::string::npos) << run.err;
   EXPECT_NE(run.err.find("the open vent at 18, 43"), std::string::npos) << run.err;
+  // Where it happened, as particles, as a picture, and the lines to change.
+  EXPECT_NE(run.err.find("scene.toml:"), std::string::npos) << run.err;
+  EXPECT_NE(run.err.find("lava.max_step: is"), std::string::npos) << run.err;
+  EXPECT_NE(read_file(out / "trouble" / "particles.ply").find("property float velocity_x"), std::string::npos);
+  EXPECT_TRUE(fs::exists(out / "trouble" / "picture.png"));
   // With steps as short as it takes it goes on, and says what became of the particles.
   Arguments again = base;
   again.push_back("--force");
   EXPECT_EQ(effuse(again).code, 0);
+  EXPECT_FALSE(fs::exists(out / "trouble"));
   EXPECT_NE(read_file(out / "flow.csv").find(",left_J,crushed,stopped\n"), std::string::npos) << read_file(out / "flow.csv").substr(0, 400);
   EXPECT_TRUE(run_json(out)["effects"]["lava"].contains("crushed"));
 }
@@ -720,17 +737,6 @@ TEST_F(ProgramTest, TakesNamesThatAreNotUtf8) {
   }
 }
 
-/// The real scene at full resolution, for 40 of its frames.
-class ProgramSlow : public ProgramTest {
- protected:
-  static Arguments run_mountain(const fs::path& out, const Arguments& more = {}) {
-    Arguments arguments = {"run", kScenes / "maunga-whau.toml", "-o", out, "--frames", "40", "--set", "output.checkpoint_every=20", "--set", "preview.width=320", "--set",
-                           "preview.height=180", "--stats"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    return arguments;
-  }
-};
-
 TEST_F(ProgramSlow, MaungaWhauKilledAfterFrameTwentyGoesOnToTheSameFortyFrames) {
   const fs::path whole = folder_ / "whole", broken = folder_ / "broken";
   const Outcome outcome = effuse(run_mountain(whole));
@@ -767,6 +773,18 @@ TEST_F(ProgramSlow, MaungaWhauKilledAfterFrameTwentyGoesOnToTheSameFortyFrames) 
   EXPECT_FALSE(handles_files(largest)) << largest << " took " << most << " s";
   EXPECT_LT(files, 0.3 * all);
   EXPECT_NE(outcome.err.find("sph.forces"), std::string::npos) << "no table of zones";
+}
+
+TEST_F(ProgramTest, AnErrorIsOneLineAndLeavesTheTerminalAloneWhateverAFileIsCalled) {
+  const fs::path file = write("new\nline \x1b[31mred\x7f.tif", "no raster");
+  for (const Arguments& arguments : {Arguments{"info", file}, Arguments{"import", file, "-o", folder_ / "a.tif"}}) {
+    const Outcome outcome = effuse(arguments);
+    EXPECT_EQ(outcome.code, 2);
+    EXPECT_EQ(std::count_if(outcome.err.begin(), outcome.err.end(), [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }), 1) << outcome.err;
+    EXPECT_TRUE(outcome.err.ends_with("\n"));
+  }
+  const Outcome json = effuse({"info", file, "--json"});
+  EXPECT_EQ(nlohmann::json::parse(json.out).at("errors").at(0).at("file"), file.string());
 }
 
 }  // namespace

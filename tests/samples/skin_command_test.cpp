@@ -484,7 +484,9 @@ std::string moved_block(const Vec3& by, bool backwards, const std::string& kelvi
   return block;
 }
 
-TEST_F(SkinCommandTest, EveryKindOfSkinIsDisplacedColouredAndSound) {
+using SkinCommandSlow = SkinCommandTest;
+
+TEST_F(SkinCommandSlow, EveryKindOfSkinIsDisplacedColouredAndSound) {
   write("block.csv", moved_block(Vec3::Zero(), false, "1150"));
   ASSERT_EQ(skin({"block.csv", "-o", "smooth.ply", "--check"}).code, 0);
   const TriMesh smooth = mesh("smooth.ply");

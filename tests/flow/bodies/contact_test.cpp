@@ -302,6 +302,21 @@ TEST(Contacts, MeshesRestOnMeshesHullsAndTheGround) {
   EXPECT_LT(world.kinetic_energy(), 1);
 }
 
+TEST(Contacts, ABoxSlidesOverFlatGroundOfFinePostsWithoutFrictionAsOverNone) {
+  // Posts just before its front face lie in the ground's face, not on a peak that could stop it.
+  const geometry::Terrain ground = geometry::Terrain::from_height_field(geometry::HeightField({-10, -10}, {0.3, 0.3}, 101, 41, std::vector<Real>(101 * 41, 0.0)));
+  for (const Real turn : {0.0, 0.4}) {
+    BodyOptions options = worlds::awake();
+    options.terrain_friction = 0;
+    RigidBodies world(options, ground);
+    world.add(Shape::box(Vec3(0.5, 0.5, 0.5)), 500, {Vec3(-8, -4, 0.5), Quat(Eigen::AngleAxisd(turn, Vec3::UnitZ()))}, {0, 0, 0}, Vec3(4, 0, 0));
+    worlds::run(world, 4);
+    EXPECT_NEAR(world.momenta()[0].x() / world.mass(0), 4, 0.004);
+    EXPECT_NEAR(world.centres()[0].x(), 8, 0.02);
+    EXPECT_NEAR(world.centres()[0].z(), 0.5, 0.005);
+  }
+}
+
 TEST(Contacts, ABoxLargerThanTheCellsRestsOnPeaksUnderItsFace) {
   // Posts 1 m apart, one of them a peak of half a metre: under the middle of a box 3.4 m wide.
   std::vector<Real> z(21 * 21, 0.0);

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "flow/reference/rigid_motion.h"
+#include "geometry/motion/pose_track.h"
 
 namespace effuse::flow::bodies {
 namespace {
@@ -72,7 +73,7 @@ TEST(Rotor, TurnsABodyOfEqualMomentsSteadily) {
     const Vec3 w(0.3, -0.2, 0.5), I = Vec3::Constant(2);
     for (int k = 0; k < 100; ++k) q = turn_freely(scheme, q, 2 * w, I, 0.01);
     // Splitting turns about three axes in turn: exact to its order only.
-    EXPECT_LT(q.angularDistance(rotation(w)), 1e-5) << static_cast<int>(scheme);
+    EXPECT_LT(q.angularDistance(geometry::rotation_by(w)), 1e-5) << static_cast<int>(scheme);
   }
 }
 
@@ -86,7 +87,7 @@ TEST(Rotor, TheMidpointTakesTurnsOfARadianAStep) {
 TEST(Rotation, OfAVectorTurnsAboutItByItsLength) {
   for (const Real angle : {1e-12, 1e-5, 1e-3, 0.5, 3.0, 10.0}) {
     const Vec3 axis = Vec3(1, -2, 2) / 3;
-    EXPECT_LT((rotation(angle * axis).coeffs() - Quat(Eigen::AngleAxisd(angle, axis)).coeffs()).norm(), 1e-15) << angle;
+    EXPECT_LT((geometry::rotation_by(angle * axis).coeffs() - Quat(Eigen::AngleAxisd(angle, axis)).coeffs()).norm(), 1e-15) << angle;
   }
 }
 

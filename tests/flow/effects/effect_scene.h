@@ -19,6 +19,7 @@ struct EffectScene {
   Scene scene;
   geometry::Terrain terrain;
   std::vector<PlacedObstacle> obstacles;
+  std::vector<PlacedBody> bodies;
   std::unique_ptr<Simulation> simulation;
 
   explicit EffectScene(const std::string& text, Real slope = 0)
@@ -29,7 +30,8 @@ struct EffectScene {
     root.finish();
     std::vector<Fault> faults;
     for (const PlannedObstacle& plan : scene.obstacles) place_obstacle(plan, mesh_of(plan), terrain, obstacles, faults);
-    World world{&terrain, 1, &obstacles};
+    for (const PlannedBody& plan : scene.bodies) place_body(plan, mesh_of(plan), terrain, bodies, faults);
+    World world{&terrain, 1, &obstacles, &bodies, nullptr, scene.body_settings};
     world.mesh = [](const PlannedForm&) { return geometry::TriMesh(); };
     for (const EffectPlan& plan : scene.effects)
       for (const Fault& fault : plan.misfits ? plan.misfits(world) : std::vector<Fault>()) faults.push_back(fault);

@@ -8,6 +8,7 @@
 
 #include "flow/sph/modern_lava.h"
 #include "geometry/procedural/primitives.h"
+#include "tests/flow/sph/beside_solids.h"
 #include "tests/flow/sph/sample_system.h"
 
 /// Lava that meets walls, measured: what stays before them, how high it stands, where it goes, how much passes a gap, what heat
@@ -27,26 +28,10 @@ constexpr Real kDensity = 2600;
 const Real kSlope = std::atan(kTan);
 
 ModernOptions on_the_slope(Real spacing) {
-  ModernOptions o;
-  o.spacing = spacing;
+  ModernOptions o = thick_lava(spacing, kNu * kDensity, 0.5 * spacing);
   o.density = kDensity;
-  o.rheology = Rheology::newtonian(kNu * kDensity);
-  o.heat.on = false;
-  o.rest_period = 0;
-  o.ground_speed = 0;
   o.gravity = kGravity * Vec3(std::sin(kSlope), 0, -std::cos(kSlope));
-  o.max_step = 0.5 * spacing;
   return o;
-}
-
-/// The plane z = 0 as far as x = end.
-ContactSource slope_to(Real end) {
-  return [=](std::span<const Vec3> x, Real reach, std::span<geometry::Contact> out) {
-    for (std::size_t i = 0; i < x.size(); ++i) {
-      out[i] = {};
-      if (const Real d = x[i].z(); d < reach && x[i].x() < end) out[i] = {Vec3(x[i].x(), x[i].y(), 0), Vec3::UnitZ(), d, Vec3::Zero(), 0, 0};
-    }
-  };
 }
 
 /// A wall across: its front is at x = 0, y from -half to half; thickness 0: a sheet.
@@ -131,7 +116,7 @@ RunUp run_up(Real dx, Real thickness, Real until) {
   obstacles.add({CollisionMesh(wall_mesh(20, thickness)), RigidMotion(RigidPose{Vec3(kLength, 0, 0), Quat::Identity()}), 0, 1});
   obstacles.update();
   const Vent vent = fissure(0.6, 0, width, 0.8, kFlux * width);
-  ModernLava lava(o, {vent}, {slope_to(1e3)}, {}, {&obstacles, {}, {}});
+  ModernLava lava(o, {vent}, {ground_at(0, 1e3)}, {}, {&obstacles, {}, {}});
   RunUp result;
   while (lava.time() < until) {
     const ModernReport report = lava.step(until - lava.time());
@@ -188,7 +173,7 @@ struct Open {
   ModernLava make() {
     obstacles.add({CollisionMesh(wall_mesh(half, thickness)), RigidMotion(pose), 0, 1});
     obstacles.update();
-    return {on_the_slope(dx), {vent}, {slope_to(kEnd)}, [](const Vec3& p) { return p.x() < kEnd; }, {&obstacles, {}, {}}};
+    return {on_the_slope(dx), {vent}, {ground_at(0, kEnd)}, [](const Vec3& p) { return p.x() < kEnd; }, {&obstacles, {}, {}}};
   }
   /// Steps once; who goes through the wall, or is in it.
   std::size_t step() {
@@ -271,7 +256,7 @@ Real discharge(Real dx, Real gap, bool slips, Real until) {
   obstacles.add({CollisionMesh(geometry::make_box(Vec3(middle.x() - half.x(), -9, -1), Vec3(middle.x() + half.x(), middle.y() - half.y(), 9))), {}, 0, 1});
   obstacles.add({CollisionMesh(geometry::make_box(Vec3(middle.x() - half.x(), middle.y() + half.y(), -1), Vec3(middle.x() + half.x(), 9, 9))), {}, 0, 1});
   obstacles.update();
-  ModernLava lava(o, {}, {slope_to(1e3)}, {}, {&obstacles, {}, {1, slips ? 0.0 : 1.0}});
+  ModernLava lava(o, {}, {ground_at(0, 1e3)}, {}, {&obstacles, {}, {1, slips ? 0.0 : 1.0}});
   std::vector<Vec3> x;
   for (const Vec3& p : lattice_block(static_cast<int>(std::lround(length / dx)), static_cast<int>(std::lround(width / dx)), static_cast<int>(std::lround(depth / dx)), dx))
     if (std::abs(p.x() - middle.x()) > half.x() || std::abs(p.y() - middle.y()) < half.y()) x.push_back(p);
@@ -337,7 +322,7 @@ struct Warm {
       hottest.assign(3, 0);
       for (std::size_t k = 0; k < heat.size(); ++k) given[k] += heat[k], hottest[k] = temperature[k];
     };
-    return {o, {}, {slope_to(-1e3)}, {}, solids};
+    return {o, {}, {ground_at(0, -1e3)}, {}, solids};
   }
   Real area() const { return 2 * 6 * kHigh * kSpacing * kSpacing; }
   void run(Real until) {
@@ -408,7 +393,7 @@ TEST(Barrier, HeatIsNotLostWhereAColdBlockGoesThrough) {
   const std::size_t block = obstacles.add({CollisionMesh(geometry::make_box(Vec3(-0.4, -0.4, -0.4), Vec3(0.4, 0.4, 0.4))), {}, 300, 1});
   obstacles.update();
   const auto at = [](Real t) { return RigidPose{Vec3(-1 + t, 1.2, 0.6), Quat::Identity()}; };
-  ModernLava lava(o, {}, {slope_to(1e3)}, {}, {&obstacles, [&](Real from, Real to) {
+  ModernLava lava(o, {}, {ground_at(0, 1e3)}, {}, {&obstacles, [&](Real from, Real to) {
     obstacles.move(block, RigidMotion(at(from), at(to), to - from));
     obstacles.update();
   }, {}});

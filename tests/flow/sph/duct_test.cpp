@@ -5,6 +5,7 @@
 
 #include "flow/sph/modern_lava.h"
 #include "geometry/procedural/primitives.h"
+#include "tests/flow/sph/beside_solids.h"
 #include "tests/flow/sph/sample_system.h"
 
 /// Lava along upright walls, beside exact solutions.
@@ -16,26 +17,6 @@ using geometry::Obstacles;
 using geometry::TriMesh;
 
 constexpr Real kSpacing = 0.2, kNu = 1;
-
-ModernOptions thick() {
-  ModernOptions o;
-  o.spacing = kSpacing;
-  o.rheology = Rheology::newtonian(kNu * o.density);
-  o.heat.on = false;
-  o.rest_period = 0;
-  o.ground_speed = 0;
-  o.max_step = 0.05;
-  return o;
-}
-
-ContactSource floor_at(Real z) {
-  return [=](std::span<const Vec3> x, Real reach, std::span<geometry::Contact> out) {
-    for (std::size_t i = 0; i < x.size(); ++i) {
-      out[i] = {};
-      if (const Real d = x[i].z() - z; d < reach) out[i] = {Vec3(x[i].x(), x[i].y(), z), Vec3::UnitZ(), d, Vec3::Zero(), 0, 0};
-    }
-  };
-}
 
 struct Duct {
   int wide, deep;       // particles
@@ -57,14 +38,14 @@ class DuctTest : public testing::TestWithParam<Duct> {};
 TEST_P(DuctTest, PassesWhatTheSeriesSays) {
   const Duct duct = GetParam();
   const Real w = duct.wide * kSpacing, H = duct.deep * kSpacing, tilt = 0.05;
-  ModernOptions o = thick();
+  ModernOptions o = thick_lava(kSpacing, kNu * ModernOptions().density, 0.05);
   o.gravity = kGravity * Vec3(std::sin(tilt), 0, -std::cos(tilt));
   o.period = Vec2(6 * kSpacing, 0);
   Obstacles obstacles;
   obstacles.add({CollisionMesh(geometry::make_box(Vec3(-90, -9, -1), Vec3(90, 0, 19))), {}, 0, 1});
   obstacles.add({CollisionMesh(geometry::make_box(Vec3(-90, w, -1), Vec3(90, w + 9, 19))), {}, 0, 2});
   obstacles.update();
-  ModernLava lava(o, {}, {floor_at(0)}, {}, {&obstacles, {}, {1, duct.first, duct.second}});
+  ModernLava lava(o, {}, {ground_at(0)}, {}, {&obstacles, {}, {1, duct.first, duct.second}});
   const std::vector<Vec3> x = lattice_block(6, duct.wide, duct.deep, kSpacing);
   lava.add(x, std::vector<Vec3>(x.size(), Vec3::Zero()), std::vector<Real>(x.size(), 1400));
   Real passed = 0;
@@ -93,7 +74,7 @@ TEST(DuctTest, LavaAtRestInAVesselHardlyCirculates) {
   Obstacles obstacles;
   obstacles.add({CollisionMesh(vessel), {}, 0, 1});
   obstacles.update();
-  ModernLava lava(thick(), {}, {floor_at(-100)}, {}, {&obstacles, {}, {}});
+  ModernLava lava(thick_lava(kSpacing, kNu * ModernOptions().density, 0.05), {}, {ground_at(-100)}, {}, {&obstacles, {}, {}});
   const std::vector<Vec3> x = lattice_block(wide, wide, deep, kSpacing);
   lava.add(x, std::vector<Vec3>(x.size(), Vec3::Zero()), std::vector<Real>(x.size(), 1400));
   while (lava.time() < 2) lava.step(0.05);

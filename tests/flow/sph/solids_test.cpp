@@ -7,6 +7,7 @@
 
 #include "flow/sph/modern_lava.h"
 #include "geometry/procedural/primitives.h"
+#include "tests/flow/sph/beside_solids.h"
 #include "tests/flow/sph/sample_system.h"
 
 /// Lava among obstacles.
@@ -19,40 +20,11 @@ using geometry::RigidMotion;
 using geometry::RigidPose;
 using geometry::TriMesh;
 
-ContactSource ground_at(Real z) {
-  return [=](std::span<const Vec3> x, Real reach, std::span<geometry::Contact> out) {
-    for (std::size_t i = 0; i < x.size(); ++i) {
-      out[i] = {};
-      if (const Real d = x[i].z() - z; d < reach) out[i] = {Vec3(x[i].x(), x[i].y(), z), Vec3::UnitZ(), d, Vec3::Zero(), 0, 0};
-    }
-  };
-}
-
-ModernOptions thick(Real spacing, Real mu) {
-  ModernOptions o;
-  o.spacing = spacing;
-  o.rheology = Rheology::newtonian(mu);
-  o.heat.on = false;
-  o.rest_period = 0;
-  o.ground_speed = 0;
-  o.max_step = 0.05;
-  return o;
-}
-
 /// A rectangle of two triangles around the origin, spanned by two half sides.
 TriMesh plate(const Vec3& a, const Vec3& b) {
   TriMesh m;
   m.positions = {Vec3(-a - b), Vec3(a - b), Vec3(a + b), Vec3(b - a)};
   m.triangles = {{0, 1, 2}, {0, 2, 3}};
-  return m;
-}
-
-/// Five walls of a box that is open at the top: a sheet.
-TriMesh tray(const Vec3& low, const Vec3& high) {
-  TriMesh m = geometry::make_box(low, high);
-  std::erase_if(m.triangles, [&](const geometry::Triangle& t) {
-    return std::all_of(t.begin(), t.end(), [&](Index v) { return m.positions[v].z() == high.z(); });
-  });
   return m;
 }
 
@@ -69,7 +41,7 @@ std::uint64_t hash_of(const ModernLava& lava) {
 // A tray as a mesh holds lava as the ground does: at rest, level, dense, under the pressure of its depth.
 TEST(Solids, ATrayHoldsLavaAtRestUnderTheWeightOfItsDepth) {
   const Real dx = 0.5, H = 8 * dx;
-  ModernOptions o = thick(dx, 26000);
+  ModernOptions o = thick_lava(dx, 26000, 0.05);
   Obstacles obstacles;
   obstacles.add({CollisionMesh(tray(Vec3::Zero(), Vec3(8 * dx, 8 * dx, 12 * dx))), {}, 0, 1});
   obstacles.update();
@@ -100,7 +72,7 @@ TEST(Solids, ATrayHoldsLavaAtRestUnderTheWeightOfItsDepth) {
 // A dam breaks against a wall of no thickness: none behind it, at any time.
 TEST(Solids, NoneGoesThroughAWallOfNoThickness) {
   const Real dx = 0.5;
-  ModernOptions o = thick(dx, 50);
+  ModernOptions o = thick_lava(dx, 50, 0.05);
   Obstacles obstacles;
   obstacles.add({CollisionMesh(plate(Vec3(0, 20, 0), Vec3(0, 0, 20))), RigidMotion(RigidPose{Vec3(6, 2, 0), Quat::Identity()}), 0, 1});
   obstacles.update();
@@ -123,7 +95,7 @@ TEST(Solids, LavaOnTheTwoSidesOfASheetKnowsNothingOfEachOther) {
     obstacles.add({CollisionMesh(tray(Vec3::Zero(), Vec3(12 * dx, 6 * dx, 12 * dx))), {}, 0, 1});
     obstacles.add({CollisionMesh(plate(Vec3(0, 20, 0), Vec3(0, 0, 20))), RigidMotion(RigidPose{Vec3(6 * dx, 0, 0), Quat::Identity()}), 0, 2});
     obstacles.update();
-    ModernOptions o = thick(dx, 26000);
+    ModernOptions o = thick_lava(dx, 26000, 0.05);
     o.viscosity_tolerance = 1e-8;
     o.divergence_tolerance = 1e-8;
     ModernLava lava(o, {}, {ground_at(-100)}, {}, {&obstacles, {}, {}});
@@ -146,7 +118,7 @@ TEST(Solids, LavaOnTheTwoSidesOfASheetKnowsNothingOfEachOther) {
 // A piston drives lava along a channel; what it drives stays before it, and no faster step is taken than its speed allows.
 TEST(Solids, APistonPushesLavaAhead) {
   const Real dx = 0.5, speed = 2;
-  ModernOptions o = thick(dx, 500);
+  ModernOptions o = thick_lava(dx, 500, 0.05);
   Obstacles obstacles;
   const std::size_t piston = obstacles.add({CollisionMesh(geometry::make_box(Vec3(-0.5, -40, -1), Vec3(0, 40, 6))), {}, 0, 1});
   obstacles.update();
@@ -173,7 +145,7 @@ TEST(Solids, APistonPushesLavaAhead) {
 // of the blade within each step; nothing is lost.
 TEST(Solids, ATurningBladeStirsAPool) {
   const Real dx = 0.4;
-  ModernOptions o = thick(dx, 200);
+  ModernOptions o = thick_lava(dx, 200, 0.05);
   Obstacles obstacles;
   obstacles.add({CollisionMesh(tray(Vec3(-2.4, -2.4, 0), Vec3(2.4, 2.4, 6))), {}, 0, 1});
   const std::size_t blade = obstacles.add({CollisionMesh(plate(Vec3(2, 0, 0), Vec3(0, 0, 2))), {}, 0, 2});
@@ -204,7 +176,7 @@ TEST(Solids, ATurningBladeStirsAPool) {
 
 TEST(Solids, FarFromAllLavaTheyChangeNoBit) {
   const auto run = [](Obstacles* obstacles) {
-    ModernLava lava(thick(0.5, 500), {}, {ground_at(0)}, {}, {obstacles, {}, {}});
+    ModernLava lava(thick_lava(0.5, 500, 0.05), {}, {ground_at(0)}, {}, {obstacles, {}, {}});
     fill(lava, lattice_block(6, 6, 6, 0.5));
     while (lava.time() < 0.5) lava.step(0.05);
     return hash_of(lava);
@@ -225,7 +197,7 @@ TEST(Solids, AreTheSameBitsOnAnyNumberOfThreadsAndAfterLoading) {
       obstacles.move(moving, RigidMotion({Vec3(4 - from, 1.5, 0.8), Quat::Identity()}, {Vec3(4 - to, 1.5, 0.8), Quat::Identity()}, to - from));
       obstacles.update();
     }, {}};
-    const auto make = [&] { return ModernLava(thick(0.4, 100), {}, {ground_at(0)}, {}, solids); };
+    const auto make = [&] { return ModernLava(thick_lava(0.4, 100, 0.05), {}, {ground_at(0)}, {}, solids); };
     ModernLava lava = make();
     fill(lava, lattice_block(8, 8, 6, 0.4));
     while (lava.time() < 1) lava.step(0.04);
@@ -246,7 +218,7 @@ TEST(Solids, AreTheSameBitsOnAnyNumberOfThreadsAndAfterLoading) {
 
 TEST(Solids, SleepingLavaWakesBeforeABarrelHitsIt) {
   const Real dx = 0.5;
-  ModernOptions o = thick(dx, 1e6);
+  ModernOptions o = thick_lava(dx, 1e6, 0.05);
   o.sleep_speed = 0.05;
   o.sleep_delay = 0.2;
   o.max_step = 1;
@@ -277,7 +249,7 @@ TEST(Solids, FreeSlipHoldsLessThanNoSlip) {
     Obstacles obstacles;
     obstacles.add({CollisionMesh(plate(Vec3(50, 0, 0), Vec3(0, 50, 0))), RigidMotion(RigidPose{Vec3(0, 0, 0), Quat::Identity()}), 0, 1});
     obstacles.update();
-    ModernOptions o = thick(0.5, 2000);
+    ModernOptions o = thick_lava(0.5, 2000, 0.05);
     o.gravity = kGravity * Vec3(std::sin(0.3), 0, -std::cos(0.3));
     ModernLava lava(o, {}, {ground_at(-50)}, {}, {&obstacles, {}, {1, friction}});
     fill(lava, lattice_block(8, 8, 3, 0.5));

@@ -1,6 +1,11 @@
+#include <fcntl.h>
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
+#include <chrono>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -75,6 +80,79 @@ TEST_F(Files, AFileBeyondTheLimitIsAResourceErrorAndLeavesTheOldOneWhole) {
   EXPECT_EQ(entries(), 1u);
 }
 
+TEST_F(Files, SeveralWhoWriteOnePathAtOnceEachWriteAWholeFile) {
+  const fs::path path = folder_ / "frame.ply";
+  constexpr std::size_t kWriters = 6, kTimes = 8, kBytes = 1 << 18;
+  std::vector<pid_t> children;
+  for (std::size_t w = 0; w < kWriters; ++w) {
+    const pid_t pid = ::fork();
+    if (pid == 0) {
+      try {
+        for (std::size_t k = 0; k < kTimes; ++k) {
+          write_file(path, std::string(kBytes, static_cast<char>('a' + w)));
+          AtomicFile file(path);
+          std::ofstream(file.temporary()) << std::string(kBytes, static_cast<char>('A' + w));
+          file.commit();
+        }
+      } catch (...) {
+        ::_exit(1);
+      }
+      ::_exit(0);
+    }
+    children.push_back(pid);
+  }
+  for (int look = 0; look < 200; ++look) {
+    if (!fs::exists(path)) continue;
+    const std::string bytes = read_file(path);
+    ASSERT_EQ(bytes, std::string(kBytes, bytes.empty() ? '?' : bytes.front())) << "half of one, half of another";
+  }
+  for (const pid_t pid : children) {
+    int status = -1;
+    ::waitpid(pid, &status, 0);
+    EXPECT_EQ(status, 0) << "one was in another's way";
+  }
+  EXPECT_EQ(entries(), 1u);
+}
+
+TEST_F(Files, NothingIsLeftOfAWriteThatIsKilled) {
+#ifdef O_TMPFILE
+  const int unnamed = ::open(folder_.c_str(), O_TMPFILE | O_WRONLY, 0600);
+#else
+  const int unnamed = -1;
+#endif
+  if (unnamed < 0) GTEST_SKIP() << "this file system has no files without a name";
+  ::close(unnamed);
+  const std::string bytes(1 << 21, 'x');
+  std::size_t whole = 0;
+  for (int k = 0; k < 20; ++k) {
+    const pid_t pid = ::fork();
+    if (pid == 0) {
+      for (int n = 0;; ++n) write_file(folder_ / fmt::format("{}.{}.state", k, n), bytes);
+    }
+    std::this_thread::sleep_for(std::chrono::microseconds(2000 + 700 * k));
+    ::kill(pid, SIGKILL);
+    ::waitpid(pid, nullptr, 0);
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder_)) {
+      EXPECT_EQ(entry.file_size(), bytes.size()) << entry.path();
+      EXPECT_EQ(entry.path().string().find(".part"), std::string::npos) << entry.path();
+      ++whole;
+      fs::remove(entry.path());
+    }
+  }
+  EXPECT_GT(whole, 0u);
+}
+
+TEST_F(Files, TheLongestNamesAreWritten) {
+  const std::string name = std::string(251, 'n') + ".ply";
+  for (int k = 0; k < 2; ++k) write_file(folder_ / name, "x");
+  EXPECT_TRUE(fs::exists(folder_ / name));
+  AtomicFile file(folder_ / name);
+  std::ofstream(file.temporary()) << "y";
+  file.commit();
+  EXPECT_EQ(read_file(folder_ / name), "y");
+  EXPECT_EQ(entries(), 1u);
+}
+
 TEST_F(Files, ATargetThatIsAFolderThrowsAndLeavesNothing) {
   fs::create_directories(folder_ / "taken" / "inside");
   EXPECT_THROW(write_file(folder_ / "taken", "x"), std::runtime_error);
@@ -106,6 +184,7 @@ TEST(Error, TheNearestNameIsTheOneATypingErrorAway) {
   EXPECT_EQ(nearest_name("viscosty", names), "viscosity");
   EXPECT_EQ(nearest_name("tempreature", names), "temperature");
   EXPECT_EQ(nearest_name("wind", names), "");
+  EXPECT_EQ(nearest_name("Z", {"x", "y", "z"}), "z") << "as near as the others, but for the letter";
 }
 
 TEST(CheckDeathTest, ABrokenPromisePrintsBothValues) { EXPECT_DEATH(CHECK_EQ(2 + 2, 5), "CHECK failed: 2 \\+ 2 == 5: 4 against 5"); }

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "geometry/base/parallel.h"
 #include "geometry/base/random.h"
 #include "geometry/procedural/primitives.h"
@@ -63,6 +65,20 @@ TEST(SelfIntersections, TrianglesWithoutAreaAreLeftOut) {
   const TriMesh mesh = triangles({{0, 0, 0}, {3, 0, 0}, {0, 3, 0}, {0.5, 0.5, -1}, {0.5, 0.5, 1}, {0.5, 0.5, 3}}, {{0, 1, 2}, {3, 4, 5}, {0, 0, 1}, {3, 3, 3}});
   EXPECT_TRUE(self_intersections(mesh).empty());
   EXPECT_TRUE(self_intersections({}).empty());
+}
+
+TEST(SelfIntersections, ManyInOnePlaceAreCountedNoFurtherThanAsked) {
+  constexpr std::size_t kCount = 2000;
+  TriMesh mesh = triangles({{0, 0, 0}, {3, 0, 0}, {0, 3, 0}}, {});
+  mesh.triangles.assign(kCount, {0, 1, 2});
+  const Pairs all = self_intersections(mesh);
+  ASSERT_EQ(all.size(), kCount * (kCount - 1) / 2);
+  EXPECT_EQ(all.front(), (std::array<Index, 2>{0, 1}));
+  EXPECT_EQ(std::adjacent_find(all.begin(), all.end()), all.end());
+  for (const std::size_t most : {std::size_t{1}, std::size_t{1000}, all.size(), all.size() + 1}) EXPECT_EQ(self_intersections(mesh, most).size(), std::min(most, all.size())) << most;
+  // A hundred times as many have 2e10 pairs: in memory they would take 160 GB.
+  mesh.triangles.assign(100 * kCount, {0, 1, 2});
+  EXPECT_EQ(self_intersections(mesh, 1000).size(), 1000u);
 }
 
 TEST(SelfIntersections, RandomTrianglesAreJudgedAsByTryingEveryPairOnAnyNumberOfThreads) {

@@ -158,6 +158,23 @@ TEST(Repair, FacesOutwardButLeavesARoomWithinASolid) {
   EXPECT_NEAR(signed_volume(room), 26, 1e-12);
 }
 
+TEST(Repair, AnyStitchEnds) {
+  // Two sheets a centimetre apart: nothing of them is joined, their rims are at the seam, or each rim is one point and two bags
+  // touch there, with four vertices inside and one each.
+  TriMesh sheets = make_grid(Vec3::Zero(), Vec2(1, 1), 3, 3);
+  const TriMesh other = make_grid(Vec3(3.01, 0, 0), Vec2(1, 1), 3, 3);
+  for (const Triangle& t : other.triangles) sheets.triangles.push_back({t[0] + 16, t[1] + 16, t[2] + 16});
+  sheets.positions.insert(sheets.positions.end(), other.positions.begin(), other.positions.end());
+  for (const auto& [stitch, left] : {std::pair{0.0, 32u}, {5e-324, 32u}, {1e-9, 32u}, {0.02, 28u}, {1e300, 10u}}) {
+    TriMesh mesh = sheets;
+    RepairOptions options;
+    options.stitch = stitch;
+    const RepairReport report = repair(mesh, options);
+    EXPECT_EQ(mesh.positions.size(), left) << stitch;
+    EXPECT_EQ(report.stitched_vertices, left == 28 ? 4u : left == 32 ? 0u : report.stitched_vertices) << stitch;
+  }
+}
+
 TEST(Repair, FillsHolesUpToTheSizeAsked) {
   TriMesh open = make_box(Vec3::Zero(), Vec3::Ones());
   const TriMesh whole = open;

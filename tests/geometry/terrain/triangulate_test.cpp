@@ -2,12 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <limits>
 
 #include "geometry/base/parallel.h"
+#include "geometry/base/random.h"
 #include "geometry/mesh/validate.h"
 #include "geometry/terrain/delaunay_internal.h"
 #include "importers/terrain/import_dem.h"
@@ -139,6 +141,23 @@ TEST(TriangulateSlow, OnAvaAlrAndMaungaWhauToo) {
     EXPECT_LE(vertical_error(field, mesh).at_posts, error + 1e-7);
     std::printf("%s to %g m: %.0f triangles, plain greedy insertion %.0f\n", name, error, ours, plain);
   }
+}
+
+TEST(TriangulateSlow, AMillionPostsTakeLessThanTwentySeconds) {
+  // Hills of 30 m with a metre of noise at every post, to two metres: one post in twenty is kept.
+  std::vector<Real> z(1000 * 1000);
+  for (std::size_t k = 0; k < z.size(); ++k) {
+    const Real x = static_cast<Real>(k % 1000), y = static_cast<Real>(k / 1000);
+    z[k] = 30 * std::sin(0.02 * x) * std::cos(0.03 * y) + 8 * std::sin(0.31 * x + 0.2 * y) + random_uniform(3, 0, k);
+  }
+  const HeightField field(Vec2::Zero(), Vec2(10, 10), 1000, 1000, std::move(z));
+  const auto start = std::chrono::steady_clock::now();
+  const TriMesh mesh = triangulate(field, 2);
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  EXPECT_LT(seconds, 20);
+  EXPECT_GT(mesh.triangles.size(), 100'000u) << "too easy";
+  EXPECT_LE(vertical_error(field, mesh).at_posts, 2 + 1e-9);
+  std::printf("a million posts: %.1f s, %zu triangles\n", seconds, mesh.triangles.size());
 }
 
 TEST(VerticalError, IsThatOfAPlaneOverATwistedCell) {

@@ -2,15 +2,11 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
-#include <chrono>
 
 #include "geometry/base/random.h"
 #include "importers/terrain/import_dem.h"
 #include "importers/terrain/import_terrain.h"
+#include "tests/importers/cost_of.h"
 #include "tests/importers/terrain/made_rasters.h"
 #include "tests/importers/test_files.h"
 
@@ -19,39 +15,28 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Cost {
-  double seconds = 0, bytes = 0;
-  int exit = -1;  // 0: refused with an InputError of one line
-};
-
-/// Reads the file as ground in a child of its own.
+/// Reads the file as ground in a child of its own; exit 0: refused with an InputError of one line.
 Cost cost_of_refusing(const fs::path& file) {
-  const auto start = std::chrono::steady_clock::now();
-  const pid_t pid = ::fork();
-  if (pid == 0) {
+  return cost_of([&] {
     try {
       import_terrain(file);
-      ::_exit(1);
+      return 1;
     } catch (const InputError& error) {
       const std::string what = error.what();
-      ::_exit(what.find('\n') == std::string::npos && what.size() < 600 && what.find(file.filename().string()) != std::string::npos ? 0 : 2);
+      return what.find('\n') == std::string::npos && what.size() < 600 && what.find(file.filename().string()) != std::string::npos ? 0 : 2;
     } catch (...) {
-      ::_exit(3);
+      return 3;
     }
-  }
-  int status = 0;
-  rusage use{};
-  EXPECT_EQ(::wait4(pid, &status, 0, &use), pid);
-  return {std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(), 1024.0 * static_cast<double>(use.ru_maxrss), WIFEXITED(status) ? WEXITSTATUS(status) : 100 + WTERMSIG(status)};
+  });
 }
 
 void expect_refused(const fs::path& file) {
   const Cost cost = cost_of_refusing(file);
   EXPECT_EQ(cost.exit, 0) << file << " (1: taken, 2: no single sentence, 3: another exception, 100 and more: a signal): " << refusal([&] { import_terrain(file); });
   EXPECT_LT(cost.seconds, 10) << file;
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-  EXPECT_LT(cost.bytes, 1.0 * (1 << 30)) << file;
-#endif
+  if (kMemoryIsCounted) {
+    EXPECT_LT(cost.peak, 1.0 * (1 << 30)) << file;
+  }
 }
 
 std::string bytes_of(const fs::path& file) {

@@ -144,6 +144,43 @@ TEST(Air, WaterMirrorsTheSkyAndIsSeenInto) {
   EXPECT_GT(pixel(plain().render(clear, o), 60, 70).x(), pixel(plain().render(water, o), 60, 70).x());
 }
 
+/// A lamp over water stands in it as a streak towards the viewer, not as a lamp upside down.
+TEST(Air, RipplesDrawLightOutTowardsTheViewer) {
+  PreviewOptions o = small();
+  o.width = 240;
+  o.height = 160;
+  o.samples = 16;
+  o.sun = o.sky = 0.02;
+  o.glow_light = o.haze = 0;
+  o.camera = {Vec3(0, -20, 4), Vec3(0, 0, 2), 0.7};
+  geometry::TriMesh mesh = geometry::make_grid(Vec3(-25, -25, 1), Vec2(50, 50), 1, 1);
+  const geometry::TriMesh lamp = geometry::make_sphere(Vec3(0, 5, 3.5), 0.4, 2);
+  const std::size_t first = mesh.positions.size(), n = first + lamp.positions.size();
+  for (const geometry::Triangle& t : lamp.triangles) mesh.triangles.push_back({t[0] + static_cast<Index>(first), t[1] + static_cast<Index>(first), t[2] + static_cast<Index>(first)});
+  mesh.positions.insert(mesh.positions.end(), lamp.positions.begin(), lamp.positions.end());
+  mesh.normals.clear();
+  mesh.attributes["color"] = {3, std::vector<float>(3 * n, 0.02f)};
+  std::vector<float> water(n, 0), glow(3 * n, 0);
+  for (std::size_t i = 0; i < n; ++i) water[i] = i < first ? 1.f : 0.f;
+  for (std::size_t i = 3 * first; i < 3 * n; ++i) glow[i] = 20;
+  mesh.attributes["water"] = {1, water};
+  mesh.attributes["glow"] = {3, glow};
+  const Image image = plain().render(mesh, o);
+  // The lamp's own pixels, and those of its light on the water below.
+  int rows = 0, streak_rows = 0, streak_columns = 0, bottom = 0;
+  for (int y = 0; y < o.height; ++y)
+    if (pixel(image, 120, y).x() > 5) ++rows, bottom = y;
+  ASSERT_GT(rows, 4);
+  for (int y = bottom + 2; y < o.height; ++y) streak_rows += pixel(image, 120, y).x() > 0.1;
+  for (int x = 0; x < o.width; ++x) {
+    bool lit = false;
+    for (int y = bottom + 2; y < o.height; ++y) lit = lit || pixel(image, x, y).x() > 0.1;
+    streak_columns += lit;
+  }
+  EXPECT_GT(streak_rows, 1.4 * rows) << "a calm mirror shows the lamp as tall as it is";
+  EXPECT_GT(streak_rows, streak_columns);
+}
+
 TEST(Air, SameBitsOnAnyNumberOfThreads) {
   Air air;
   for (int i = 0; i < 300; ++i) {

@@ -9,6 +9,7 @@
 
 #include "skin/color/lava_color.h"
 #include "skin/write/write_animation.h"
+#include "skin/write/write_flipbook.h"
 #include "skin/write/write_mesh.h"
 #include "tests/skin/sample_lava.h"
 
@@ -46,6 +47,25 @@ class GltfValidatorSlow : public testing::Test {
   void TearDown() override { fs::remove_all(folder_); }
   fs::path folder_;
 };
+
+TEST_F(GltfValidatorSlow, AFlipbookHasNoErrorsAndNoWarnings) {
+  Flipbook book("film"), one("film"), none("film");
+  geometry::TriMesh ground = testing_meshes::tube(10, 1, 4, 6);
+  ground.attributes.clear();
+  book.add_still("terrain", ground);
+  book.add_frame("skin", 0, geometry::TriMesh{});
+  for (int k = 1; k < 5; ++k) {
+    geometry::TriMesh mesh = testing_meshes::tube(60, 3, 10 * k, 12);
+    color_lava(mesh);
+    book.add_frame("skin", 0.25 * k, mesh);
+    if (k == 1) one.add_frame("skin", 0, mesh);
+  }
+  book.finish(folder_ / "film.glb", 1.25);
+  one.finish(folder_ / "one.glb", 0.25);
+  none.finish(folder_ / "none.glb", 1);
+  const Outcome outcome = validate_gltf({folder_ / "film.glb", folder_ / "one.glb", folder_ / "none.glb"});
+  EXPECT_EQ(outcome.code, 0) << outcome.text;
+}
 
 TEST_F(GltfValidatorSlow, ThingsThatMoveHaveNoErrorsAndNoWarnings) {
   geometry::TriMesh ring = testing_meshes::tube(60, 3, 10, 12);

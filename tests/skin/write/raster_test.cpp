@@ -300,6 +300,46 @@ TEST_F(RasterFiles, AFullDiskIsAResourceErrorAndLeavesTheOldMapWhole) {
   EXPECT_EQ(files(), 1u);
 }
 
+TEST_F(RasterFiles, HeightsAndTheirSystemAreWrittenBothOrNeither) {
+  Raster large = sample(100, 100, 3);
+  large.crs = "EPSG:32633";
+  const auto full = [&](const fs::path& file, const Raster& raster, rlim_t bytes) {
+    const pid_t pid = ::fork();
+    if (pid == 0) {
+      std::signal(SIGXFSZ, SIG_IGN);
+      const rlimit limit{bytes, bytes};
+      ::setrlimit(RLIMIT_FSIZE, &limit);
+      int code = 1;
+      try {
+        write_esri_ascii(file, raster);
+      } catch (const ResourceError&) {
+        code = 0;
+      } catch (...) {
+      }
+      ::_exit(code);
+    }
+    int status = -1;
+    ::waitpid(pid, &status, 0);
+    return status;
+  };
+  EXPECT_EQ(full(folder_ / "new.asc", large, 10'000), 0);
+  EXPECT_EQ(files(), 0u);
+  Raster tiny = sample(3, 2, 3);
+  tiny.crs = read_file(kMountEden);
+  ASSERT_LT(encode_esri_ascii(tiny).size(), 300u);
+  ASSERT_GT(tiny.crs.size(), 400u);
+  EXPECT_EQ(full(folder_ / "new.asc", tiny, 350), 0);
+  EXPECT_EQ(files(), 0u) << "heights without the system they are in";
+  Raster small = sample(5, 4, 3);
+  small.crs = "EPSG:32750";
+  write_esri_ascii(folder_ / "old.asc", small);
+  const std::string heights = read_file(folder_ / "old.asc"), system = read_file(folder_ / "old.prj");
+  EXPECT_EQ(full(folder_ / "old.asc", large, 10'000), 0);
+  EXPECT_EQ(read_file(folder_ / "old.asc"), heights);
+  EXPECT_EQ(read_file(folder_ / "old.prj"), system);
+  EXPECT_EQ(files(), 2u);
+}
+
 /// The reader everybody uses, where it is installed.
 TEST_F(RasterFiles, GdalReadsTheSamePlaceSystemAndValues) {
   if (std::system("gdalinfo --version >/dev/null 2>&1") != 0) GTEST_SKIP() << "gdalinfo is not on this machine";

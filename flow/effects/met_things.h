@@ -1,0 +1,46 @@
+#pragma once
+
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "flow/integrate/plane_contacts.h"
+#include "flow/scene/effect.h"
+#include "geometry/collide/obstacles.h"
+
+namespace effuse::flow {
+
+/// Obstacles of a scene, and its rigid bodies as another effect moves them, for an effect that meets them and moves none. Bodies that can
+/// break are not among them. An effect steps through a frame that the bodies' own has behind it, or before it: over that frame a body goes
+/// straight from where it was to where it is, turning at a constant rate.
+class MetThings {
+ public:
+  /// All are where they are at time 0.
+  explicit MetThings(const World& world);
+  /// Looks among the others for one that moves bodies; as Effect::meet(). Without one they stay.
+  void meet(const std::vector<Effect*>& others);
+
+  bool empty() const { return obstacles_.empty(); }
+  const geometry::Obstacles& obstacles() const { return obstacles_; }
+  /// They go from where they are at t [s] to where they are dt later, dt >= 0.
+  void move(Real t, Real dt);
+  /// Adds to out the planes of what of ground (null: none) and things, up to three, each x may reach: within reach [m] of it, thickness [m] off.
+  /// To be called after move().
+  void add_planes(const geometry::Terrain* terrain, std::span<const Vec3> x, Real reach, Real thickness, std::vector<PlaneContact>& out);
+
+  void save(StateWriter& out) const;
+  void load(StateReader& in);
+
+ private:
+  void look();
+
+  geometry::Obstacles obstacles_;
+  std::vector<geometry::PoseTrack> tracks_;  // of the scene's obstacles, which come first
+  std::vector<std::size_t> bodies_;          // the scene's numbers of those that come behind
+  const Effect* mover_ = nullptr;
+  std::vector<geometry::RigidPose> from_, to_;  // of bodies_, at:
+  Real from_time_ = 0, to_time_ = 0;            // [s]
+  std::vector<geometry::Contact> found_;
+};
+
+}  // namespace effuse::flow

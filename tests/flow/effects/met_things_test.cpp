@@ -1,0 +1,94 @@
+#include "flow/effects/met_things.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/flow/effects/effect_scene.h"
+
+/// Effects that meet rigid bodies which another effect moves.
+namespace effuse::flow {
+namespace {
+
+/// A box that flies through the scene, for 17 frames until it meets the ground; half of its edges.
+const std::string kBox = "[[body]]\nbox = [2, 2, 1]\nposition = [-4, 0, 3]\nvelocity = [4, 0, 0]\ndensity = 2000\n";
+const Vec3 kHalf(1, 1, 0.5);
+
+TEST(MetThings, BodiesMoveBesideEffectsOtherThanLavaAndBeforeThem) {
+  EffectScene scene(kBox + "[[particles]]\n[[particles.emitter]]\nat = [9, 9, 5]\nrate = 1\n");
+  ASSERT_EQ(scene.simulation->effects().size(), 2u);
+  EXPECT_EQ(scene.simulation->effects()[0]->name(), "bodies");
+  scene.frames(12);
+  EXPECT_NEAR(scene.effect("bodies").body_poses()[0].position.x(), -2, 1e-6);
+}
+
+TEST(MetThings, AreWhereTheirEffectHasThemAtAnyMomentOfItsFrame) {
+  EffectScene scene(kBox + "[[particles]]\n[[particles.emitter]]\nat = [9, 9, 5]\nrate = 1\n");
+  const World world{&scene.terrain, 1, &scene.obstacles, &scene.bodies};
+  MetThings things(world);
+  std::vector<Effect*> others;
+  for (const auto& effect : scene.simulation->effects()) others.push_back(effect.get());
+  things.meet(others);
+  const auto middle = [&] { return Vec3(things.obstacles().bounds().center()); };
+  things.move(0, 0);
+  EXPECT_NEAR(middle().x(), -4, 1e-9);
+  for (int frame = 1; frame <= 5; ++frame) {
+    scene.frames(1);
+    const Real begin = (frame - 1) / 24.0;
+    for (const Real u : {0.25, 0.5, 1.0}) {
+      things.move(begin + (u - 0.25) / 24, 0.25 / 24);
+      EXPECT_NEAR(middle().x(), -4 + 4 * (begin + u / 24), 1e-3) << frame << " " << u;
+    }
+  }
+  // As a contact tells it.
+  geometry::Contact c;
+  EXPECT_EQ(things.obstacles().contacts(middle() + Vec3(1.1, 0, 0), 1, std::span(&c, 1)), 1);
+  EXPECT_NEAR(c.surface_velocity.x(), 4, 0.01);
+  EXPECT_NEAR(c.distance, 0.1, 1e-6);
+}
+
+TEST(MetThings, NoParticleIsInABodyThatFliesThroughThem) {
+  EffectScene scene(kBox + "[[particles]]\npreset = \"sand\"\n[[particles.emitter]]\nfrom = \"disk\"\nat = [-2, 0, 5]\nradius = 2\ndirection = [0, 0, -1]\nspeed = 8\nrate = 1000\nlifetime = 100\n");
+  std::size_t on_top = 0;
+  for (int frame = 0; frame < 16; ++frame) {
+    scene.frames(1);
+    const geometry::RigidPose pose = scene.effect("bodies").body_poses()[0];
+    const NamedCloud cloud = scene.effect("sand").clouds()[0];
+    for (std::size_t i = 0; i < cloud.x.size(); ++i) {
+      const Vec3 off = (pose.orientation.conjugate() * (cloud.x[i] - pose.position)).cwiseAbs() - kHalf;
+      EXPECT_GT(off.maxCoeff(), -1e-3) << frame;
+      on_top += off.x() < 0 && off.y() < 0 && std::abs(off.z()) < 0.05;
+    }
+  }
+  EXPECT_GT(on_top, 50u);
+}
+
+TEST(MetThings, ABodyPushesJellyAndAnElasticBox) {
+  for (const std::string soft : {"[[springs]]\nname = \"soft\"\nposition = [0, 0, 3]\nsize = 1\npoints = 5\ndensity = 100\nstiffness = 2000\ndamping = 5\ncontact_stiffness = 20000\ncontact_damping = 20\n",
+                                 "[[elastic]]\nname = \"soft\"\nbox = [1, 1, 1]\nspacing = 0.5\nposition = [0, 0, 3]\nyoungs_modulus = 1e5\ndensity = 200\n"}) {
+    EffectScene scene(kBox + soft);
+    scene.frames(17);  // both fall; the box's front, at -0.17 m now, met the other's back, at -0.5 m, two frames ago
+    const Real front = scene.effect("bodies").body_poses()[0].position.x() + 1;
+    ASSERT_NEAR(front, -3 + 4 * 17 / 24.0, 1e-6);
+    Real sum = 0, count = 0;
+    for (const Vec3& x : scene.effect("soft").meshes()[0].mesh.positions) {
+      EXPECT_GT(x.x(), front - 0.2) << soft;  // contacts are springs: as deep as four metres a second drive them
+      sum += x.x(), ++count;
+    }
+    EXPECT_GT(sum / count, 0.1) << soft;
+  }
+}
+
+TEST(MetThings, GoesOnToTheSameBitsFromTheMidstOfAFrame) {
+  const std::string text = kBox + "[[particles]]\npreset = \"sand\"\n[[particles.emitter]]\nfrom = \"disk\"\nat = [-2, 0, 2]\nradius = 2\nrate = 300\n";
+  EffectScene whole(text), half(text);
+  for (EffectScene* each : {&whole, &half}) each->frames(20);
+  // Bodies have their frame behind them, particles have not.
+  int steps = 0;
+  half.simulation->advance([&] { return ++steps < 6; });
+  EffectScene again(text);
+  again.simulation->restore(half.simulation->checkpoint("key"), "key", "file");
+  for (EffectScene* each : {&whole, &again}) each->frames(3);
+  EXPECT_EQ(whole.simulation->state_hash(), again.simulation->state_hash());
+}
+
+}  // namespace
+}  // namespace effuse::flow
