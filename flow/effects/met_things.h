@@ -10,9 +10,10 @@
 
 namespace effuse::flow {
 
-/// Obstacles of a scene, and its rigid bodies as another effect moves them, for an effect that meets them and moves none. Of a body
-/// that has broken it meets the pieces, each coming from where it was in the body. Blocks of crust are not among them. An effect steps through a frame that the bodies' own has behind it, or before it: over that frame a body goes
-/// straight from where it was to where it is, turning at a constant rate.
+/// Obstacles of a scene, and its rigid bodies as another effect moves them, for an effect that meets them and moves none. Of a body that
+/// has broken it meets the pieces, each coming from where it was in the body. Blocks of crust are not among them. An effect steps through a
+/// frame that the bodies' own has behind it, or before it: over that frame a body goes straight from where it was to where it is, turning
+/// at a constant rate.
 class MetThings {
  public:
   /// All are where they are at time 0.
