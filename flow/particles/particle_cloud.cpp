@@ -14,6 +14,7 @@ namespace effuse::flow::particles {
 
 namespace {
 constexpr std::size_t kGrain = 4096;
+constexpr std::size_t kBlock = 128;   // particles whose eddies are asked for together
 constexpr Real kEddyStrength = 1.6;   // of the noise's curl per unit of amplitude: its deviation is then about the turbulence
 constexpr std::uint64_t kThinning = 20;  // stream of an emitter's seed, of none of its own numbers
 constexpr std::array<std::uint64_t, 3> kEddySeeds = {0xed01, 0xed02, 0xed03};
@@ -73,7 +74,9 @@ void ParticleCloud::step(Real dt, std::span<const Sources> sources) {
     const auto at = [&](std::size_t i) { return Box3(in_noise(x_[i], time_, options_.forces)); };
     noise_.cover(parallel_reduce(size(), Box3(), at, [](const Box3& a, const Box3& b) { return a.merged(b); }, kGrain), kEddyPoints * size());
   }
-  parallel_ranges(size(), kGrain, [&](std::size_t begin, std::size_t stop) { advance(begin, stop, dt); });
+  parallel_ranges(size(), kGrain, [&](std::size_t begin, std::size_t stop) {
+    for (std::size_t b = begin; b < stop; b += kBlock) advance(b, std::min(stop, b + kBlock), dt);
+  });
   time_ = end;
   // Those that lie are asked for nothing.
   moving_.clear();
@@ -134,6 +137,16 @@ void ParticleCloud::advance(std::size_t begin, std::size_t end, Real dt) {
   const Vec3 weight(0, 0, -f.gravity * (1 - f.buoyancy));
   const Real k = f.response > 0 ? 1 / f.response : 0;
   const Real whole_fade = std::exp(-k * dt), whole_gone = -std::expm1(-k * dt);
+  // The eddies about all that moves, in its order.
+  DCHECK(end - begin <= kBlock);
+  std::array<Vec3, kBlock> at, air;
+  if (f.turbulence > 0 && k > 0) {
+    std::size_t n = 0;
+    for (std::size_t i = begin; i < end; ++i)
+      if (!stuck_[i]) at[n++] = in_noise(x_[i], time_, f);
+    noise_.sample(std::span(at).first(n), std::span(air).first(n));
+  }
+  std::size_t next = 0;
   for (std::size_t i = begin; i < end; ++i) {
     if (stuck_[i]) {
       dx_[i] = Vec3::Zero();
@@ -153,7 +166,7 @@ void ParticleCloud::advance(std::size_t begin, std::size_t end, Real dt) {
       continue;
     }
     Vec3 w = f.wind;
-    if (f.turbulence > 0) w += f.turbulence / kEddyStrength * noise_(in_noise(x_[i], time_, f));
+    if (f.turbulence > 0) w += f.turbulence / kEddyStrength * air[next++];
     const Real fade = newborn ? std::exp(-k * s) : whole_fade, gone = newborn ? -std::expm1(-k * s) : whole_gone;
     const Vec3 settled = a / k, u = v_[i] - w;
     dx_[i] = s * (w + settled) + gone / k * (u - settled);

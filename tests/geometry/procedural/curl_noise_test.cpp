@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "geometry/base/random.h"
 #include "geometry/procedural/noise.h"
@@ -41,6 +42,10 @@ TEST(CurlNoise, HasTheSameBitsFromItsTable) {
       const Vec3 p = half * Vec3(c % 3 - 1, c / 3 % 3 - 1, c / 9 - 1);
       ASSERT_EQ(covered(p), hashed(p)) << p.transpose();
     }
+    std::vector<Vec3> many, got(77);
+    for (std::uint64_t n = 0; n < got.size(); ++n) many.push_back(point(n));
+    covered.sample(many, got);
+    for (std::size_t n = 0; n < got.size(); ++n) ASSERT_EQ(got[n], hashed(many[n])) << half << ' ' << n;
   }
 }
 
