@@ -234,7 +234,7 @@ Lines describe_points(const fs::path& file) {
 FileFacts file_facts(const fs::path& file, const ReadLimits& limits) {
   if (lower_extension(file) == ".toml") return {describe_scene(file), ""};
   if (lower_extension(file) == ".bvh") return {describe_skeleton(file), ""};
-  if (lower_extension(file) == ".trc") return {describe_points(file), ""};
+  if (lower_extension(file) == ".trc" || lower_extension(file) == ".tsv") return {describe_points(file), ""};
   return is_dem(file) ? describe_grid(file, limits) : describe_mesh(file, limits);
 }
 

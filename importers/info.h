@@ -19,7 +19,7 @@ struct FileFacts {
 ///   meshes         validate()'s report, pairs of triangles that cut through one another (of up to kMostTested triangles),
 ///                  box, area, volume when it encloses one, attributes, what the file says of up axis, unit and place, or a guess
 ///   scenes (TOML)  name, effects, tables
-///   clips          joints or markers, frames, travel (.bvh, .trc)
+///   clips          joints or markers, frames, travel (.bvh, .trc, .tsv)
 /// and what its reader noted. Throws InputError as the readers do; for a file none of them reads, it
 /// names those that there are. limits: of the readers of meshes and grids.
 FileFacts file_facts(const std::filesystem::path& file, const ReadLimits& limits = {});

@@ -10,9 +10,10 @@
 
 namespace effuse::flow {
 
-/// Obstacles of a scene, and its rigid bodies as another effect moves them, for an effect that meets them and moves none. Bodies that can
-/// break are not among them. An effect steps through a frame that the bodies' own has behind it, or before it: over that frame a body goes
-/// straight from where it was to where it is, turning at a constant rate.
+/// Obstacles of a scene, and its rigid bodies as another effect moves them, for an effect that meets them and moves none. Of a body that
+/// has broken it meets the pieces, each coming from where it was in the body. Blocks of crust are not among them. An effect steps through a
+/// frame that the bodies' own has behind it, or before it: over that frame a body goes straight from where it was to where it is, turning
+/// at a constant rate.
 class MetThings {
  public:
   /// All are where they are at time 0.
@@ -32,14 +33,24 @@ class MetThings {
   void load(StateReader& in);
 
  private:
+  /// A body of the scene, or a piece of one.
+  struct Met {
+    Index id, body;        // as SolidPiece has them
+    std::size_t obstacle;  // kNone: loaded, and its mesh not yet asked for
+    geometry::RigidPose from, to;  // at from_time_ and to_time_
+  };
+  static constexpr std::size_t kNone = ~std::size_t{0};
   void look();
+  void find_meshes();
+  std::size_t add(const geometry::TriMesh& mesh, const geometry::RigidPose& pose, Index id, Index body);
 
   geometry::Obstacles obstacles_;
   std::vector<geometry::PoseTrack> tracks_;  // of the scene's obstacles, which come first
-  std::vector<std::size_t> bodies_;          // the scene's numbers of those that come behind
+  std::vector<Met> bodies_;
+  std::vector<std::uint8_t> breaks_;  // of the scene's bodies
+  std::vector<Real> temperature_;     // of those [K]
   const Effect* mover_ = nullptr;
-  std::vector<geometry::RigidPose> from_, to_;  // of bodies_, at:
-  Real from_time_ = 0, to_time_ = 0;            // [s]
+  Real from_time_ = 0, to_time_ = 0;  // [s]
   std::vector<geometry::Contact> found_;
 };
 

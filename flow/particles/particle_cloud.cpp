@@ -1,6 +1,7 @@
 #include "flow/particles/particle_cloud.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "geometry/base/check.h"
@@ -8,28 +9,24 @@
 #include "geometry/base/parallel.h"
 #include "geometry/base/random.h"
 #include "geometry/base/zones.h"
-#include "geometry/procedural/noise.h"
 
 namespace effuse::flow::particles {
 
 namespace {
 constexpr std::size_t kGrain = 4096;
+constexpr std::size_t kBlock = 128;   // particles whose eddies are asked for together
 constexpr Real kEddyStrength = 1.6;   // of the noise's curl per unit of amplitude: its deviation is then about the turbulence
 constexpr std::uint64_t kThinning = 20;  // stream of an emitter's seed, of none of its own numbers
-constexpr std::uint64_t kEddySeed[] = {0xed01, 0xed02, 0xed03};
+constexpr std::array<std::uint64_t, 3> kEddySeeds = {0xed01, 0xed02, 0xed03};
+constexpr std::size_t kEddyPoints = 4;   // of the noise's lattice a particle, at most, are kept in a table
 enum Death : std::uint8_t { kAlive, kAged, kLeft, kFallen };
 
-/// Curl of a vector of three noises that drift through their own pattern.
-Vec3 eddies(const Vec3& x, Real t, const Forces& f) {
-  const Vec3 p = x / f.eddy_size + Vec3(0.31, -0.17, 0.23) * (t * f.turbulence / f.eddy_size);
-  Vec3 g[3];
-  for (std::size_t k = 0; k < 3; ++k) g[k] = geometry::gradient_noise_sample(p, kEddySeed[k]).gradient;
-  return f.turbulence / kEddyStrength * Vec3(g[2].y() - g[1].z(), g[0].z() - g[2].x(), g[1].x() - g[0].y());
-}
+/// Where the eddies' noise is looked up: through its own pattern, drifting.
+Vec3 in_noise(const Vec3& x, Real t, const Forces& f) { return x / f.eddy_size + Vec3(0.31, -0.17, 0.23) * (t * f.turbulence / f.eddy_size); }
 }  // namespace
 
 ParticleCloud::ParticleCloud(const CloudOptions& options, std::vector<EmitterOptions> emitters, Contacts contacts, Move move)
-    : options_(options), contacts_(std::move(contacts)), move_(std::move(move)) {
+    : options_(options), noise_(kEddySeeds), contacts_(std::move(contacts)), move_(std::move(move)) {
   CHECK_GE(options.forces.response, 0);
   CHECK_GT(options.forces.eddy_size, 0);
   for (EmitterOptions& each : emitters) emitters_.emplace_back(each);
@@ -73,7 +70,13 @@ void ParticleCloud::step(Real dt, std::span<const Sources> sources) {
   counts_.born += size() - old;
   dx_.resize(size());
   dead_.assign(size(), kAlive);
-  parallel_ranges(size(), kGrain, [&](std::size_t begin, std::size_t stop) { advance(begin, stop, dt); });
+  if (options_.forces.turbulence > 0) {
+    const auto at = [&](std::size_t i) { return Box3(in_noise(x_[i], time_, options_.forces)); };
+    noise_.cover(parallel_reduce(size(), Box3(), at, [](const Box3& a, const Box3& b) { return a.merged(b); }, kGrain), kEddyPoints * size());
+  }
+  parallel_ranges(size(), kGrain, [&](std::size_t begin, std::size_t stop) {
+    for (std::size_t b = begin; b < stop; b += kBlock) advance(b, std::min(stop, b + kBlock), dt);
+  });
   time_ = end;
   // Those that lie are asked for nothing.
   moving_.clear();
@@ -134,6 +137,16 @@ void ParticleCloud::advance(std::size_t begin, std::size_t end, Real dt) {
   const Vec3 weight(0, 0, -f.gravity * (1 - f.buoyancy));
   const Real k = f.response > 0 ? 1 / f.response : 0;
   const Real whole_fade = std::exp(-k * dt), whole_gone = -std::expm1(-k * dt);
+  // The eddies about all that moves, in its order.
+  DCHECK(end - begin <= kBlock);
+  std::array<Vec3, kBlock> at, air;
+  if (f.turbulence > 0 && k > 0) {
+    std::size_t n = 0;
+    for (std::size_t i = begin; i < end; ++i)
+      if (!stuck_[i]) at[n++] = in_noise(x_[i], time_, f);
+    noise_.sample(std::span(at).first(n), std::span(air).first(n));
+  }
+  std::size_t next = 0;
   for (std::size_t i = begin; i < end; ++i) {
     if (stuck_[i]) {
       dx_[i] = Vec3::Zero();
@@ -153,7 +166,7 @@ void ParticleCloud::advance(std::size_t begin, std::size_t end, Real dt) {
       continue;
     }
     Vec3 w = f.wind;
-    if (f.turbulence > 0) w += eddies(x_[i], time_, f);
+    if (f.turbulence > 0) w += f.turbulence / kEddyStrength * air[next++];
     const Real fade = newborn ? std::exp(-k * s) : whole_fade, gone = newborn ? -std::expm1(-k * s) : whole_gone;
     const Vec3 settled = a / k, u = v_[i] - w;
     dx_[i] = s * (w + settled) + gone / k * (u - settled);
@@ -237,7 +250,7 @@ void ParticleCloud::add_to(StateHash& hash) const {
 std::size_t ParticleCloud::memory() const {
   return (x_.capacity() + v_.capacity() + dx_.capacity()) * sizeof(Vec3) +
          (born_.capacity() + lifetime_.capacity() + size_.capacity() + temperature_.capacity()) * sizeof(Real) + id_.capacity() * sizeof(std::uint64_t) +
-         (moved_x_.capacity() + moved_dx_.capacity() + moved_v_.capacity()) * sizeof(Vec3) + moving_.capacity() * sizeof(Index) + stuck_.capacity() + dead_.capacity() + found_.capacity() * sizeof(geometry::Contact);
+         (moved_x_.capacity() + moved_dx_.capacity() + moved_v_.capacity()) * sizeof(Vec3) + moving_.capacity() * sizeof(Index) + stuck_.capacity() + dead_.capacity() + found_.capacity() * sizeof(geometry::Contact) + noise_.memory();
 }
 
 }  // namespace effuse::flow::particles

@@ -10,6 +10,7 @@
 #include "geometry/base/state_io.h"
 #include "geometry/base/types.h"
 #include "geometry/collide/contact.h"
+#include "geometry/procedural/curl_noise.h"
 
 namespace effuse::flow::particles {
 
@@ -23,7 +24,7 @@ struct Attractor {
 /// What acts on every particle between births and deaths:
 ///   v' = gravity (1 - buoyancy) + attractors - (v - wind - eddies(x, t)) / response
 /// gravity points down z; buoyancy 1 floats, 2 rises as fast as it would fall. Eddies: the curl of gradient noise, so that they
-/// have no sources, about turbulence [m/s] strong and eddy_size [m] wide, changing over eddy_size / turbulence [s].
+/// have no sources (geometry's CurlNoise), about turbulence [m/s] strong and eddy_size [m] wide, changing over eddy_size / turbulence [s].
 struct Forces {
   Real gravity = kGravity;
   Real buoyancy = 0;
@@ -96,6 +97,7 @@ class ParticleCloud {
   static void arrays(Self& self, Archive& io);
 
   CloudOptions options_;
+  geometry::CurlNoise noise_;  // of the eddies
   std::vector<Emitter> emitters_;
   Contacts contacts_;
   Move move_;

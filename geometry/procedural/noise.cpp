@@ -9,17 +9,9 @@ namespace effuse::geometry {
 
 namespace {
 
-/// One of the twelve (+-1, +-1, 0), (+-1, 0, +-1), (0, +-1, +-1).
 Vec3 lattice_gradient(std::int64_t i, std::int64_t j, std::int64_t k, std::uint64_t seed) {
-  // j and k share a counter; the odd factor keeps (j, k) apart from all others nearby.
-  const std::uint64_t row = static_cast<std::uint64_t>(j) * 0x9e3779b97f4a7c15ULL + static_cast<std::uint64_t>(k);
-  const std::uint64_t bits = random_bits(seed, row, static_cast<std::uint64_t>(i));
-  const Real s = bits & 1 ? 1 : -1, t = bits & 2 ? 1 : -1;
-  switch ((bits >> 32) % 3) {  // 2^32 / 3: the bias is 1e-10
-    case 0: return {s, t, 0};
-    case 1: return {s, 0, t};
-    default: return {0, s, t};
-  }
+  const int* d = kLatticeDirections[lattice_direction(i, j, k, seed)];
+  return {static_cast<Real>(d[0]), static_cast<Real>(d[1]), static_cast<Real>(d[2])};
 }
 
 Real fade(Real t) { return t * t * t * (t * (t * 6 - 15) + 10); }

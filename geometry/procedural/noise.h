@@ -1,7 +1,9 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
+#include "geometry/base/random.h"
 #include "geometry/base/types.h"
 
 namespace effuse::geometry {
@@ -23,6 +25,16 @@ Real gradient_noise(const Vec3& p, std::uint64_t seed);
 
 /// The same with its exact gradient.
 NoiseSample gradient_noise_sample(const Vec3& p, std::uint64_t seed);
+
+/// Gradient noise's directions at lattice points, and which of them stands at (i, j, k).
+inline constexpr int kLatticeDirections[12][3] = {{-1, -1, 0}, {1, -1, 0}, {-1, 1, 0}, {1, 1, 0}, {-1, 0, -1}, {1, 0, -1},
+                                                  {-1, 0, 1},  {1, 0, 1},  {0, -1, -1}, {0, 1, -1}, {0, -1, 1}, {0, 1, 1}};
+inline std::size_t lattice_direction(std::int64_t i, std::int64_t j, std::int64_t k, std::uint64_t seed) {
+  // j and k share a counter; the odd factor keeps (j, k) apart from all others nearby.
+  const std::uint64_t row = static_cast<std::uint64_t>(j) * 0x9e3779b97f4a7c15ULL + static_cast<std::uint64_t>(k);
+  const std::uint64_t bits = random_bits(seed, row, static_cast<std::uint64_t>(i));
+  return (bits >> 32) % 3 * 4 + (bits & 3);  // 2^32 / 3: the bias is 1e-10
+}
 
 struct FractalOptions {
   int octaves = 5;         ///< >= 1

@@ -107,9 +107,100 @@ PointClip read_trc(const Reader& r, const Lines& lines) {
   return clip;
 }
 
-PointClip read_csv(const Reader& r, const Lines& lines) {
+constexpr std::string_view kFrames = "NO_OF_FRAMES", kSection = "Trajectories";
+
+/// Rows of a key and its values, then three fields a marker.
+PointClip read_tracked(const Reader& r, const Lines& lines) {
+  PointClip clip;
+  Real rate = 0, markers = 0;
+  std::size_t before = 0, l = 0, named = 0;  // fields before the first marker's
+  for (; l < lines.all.size(); ++l) {
+    auto row = fields(lines.all[l], '\t');
+    double value = 0;
+    if (row[0].empty() || parse_number(row[0], value) || row[0] == "NULL" || row[0] == "NaN") break;
+    while (row.size() > 1 && row.back().empty()) row.pop_back();
+    if (row[0] == "Frame") before = 2;
+    if (row.size() < 2) continue;
+    if (row[0] == "FREQUENCY") rate = r.number(l, row[1]);
+    if (row[0] == "NO_OF_MARKERS") markers = r.number(l, row[1]);
+    if (row[0] == "DATA_INCLUDED" && row[1] != "3D") r.wrong(l, fmt::format("holds {} data, wanted 3D: places of markers", quote(row[1])));
+    if (row[0] != "MARKER_NAMES") continue;
+    named = l;
+    clip.names.assign(row.begin() + 1, row.end());
+  }
+  if (!(rate > 0) || clip.names.empty()) r.wrong(0, "does not say FREQUENCY above 0 and MARKER_NAMES before its frames");
+  if (markers != static_cast<Real>(clip.names.size())) r.wrong(named, fmt::format("names {} markers, wanted {:g} as NO_OF_MARKERS says", clip.names.size(), markers));
+  clip.frame_time = 1 / rate;
+  const std::size_t width = before + 3 * clip.names.size();
+  Real first = 0;
+  for (; l < lines.all.size(); ++l) {
+    auto row = fields(lines.all[l], '\t');
+    while (row.size() > width && row.back().empty()) row.pop_back();
+    if (row.size() != width) r.wrong(l, fmt::format("has {} fields, wanted {}", row.size(), width));
+    if (before > 0) {
+      const Real time = r.number(l, row[1]);
+      if (clip.frames.empty()) first = time;
+      r.check_time(l, time, clip.frames.size(), first, clip.frame_time);
+    }
+    std::vector<Vec3> points;
+    for (std::size_t k = before; k < width; k += 3) {
+      for (std::size_t a = k; a < k + 3; ++a)
+        if (row[a] == "NULL" || row[a] == "NaN") row[a] = {};
+      const Vec3 p = r.point(l, std::span(row).subspan(k, 3));
+      points.push_back(p.isZero(0) ? Vec3(Vec3::Constant(kNone)) : Vec3(1e-3 * p));
+    }
+    clip.frames.push_back(std::move(points));
+  }
+  if (clip.frames.empty()) r.wrong(lines.all.size() - 1, "has no frame, wanted at least one");
+  return clip;
+}
+
+/// The section of trajectories of a table in sections, which empty rows end.
+PointClip read_section(const Reader& r, const Lines& lines, std::size_t title, char between) {
+  const auto row_at = [&](std::size_t l) {
+    if (l >= lines.all.size()) r.wrong(lines.all.size() - 1, "ends in the header of its trajectories");
+    return fields(lines.all[l], between);
+  };
+  PointClip clip;
+  const Real rate = r.number(title + 1, row_at(title + 1)[0]);
+  if (!(rate > 0)) r.wrong(title + 1, fmt::format("{:g} frames a second, wanted more than 0", rate));
+  clip.frame_time = 1 / rate;
+  auto names = row_at(title + 2), columns = row_at(title + 3), units = row_at(title + 4);
+  while (!columns.empty() && columns.back().empty()) columns.pop_back();
+  if (columns.size() < 5 || columns.size() % 3 != 2 || lower(std::string(columns[0])) != "frame" || lower(std::string(columns[1])) != "sub frame")
+    r.wrong(title + 3, "wanted Frame, Sub Frame, X, Y, Z, ...");
+  names.resize(columns.size());
+  units.resize(columns.size());
+  const std::string_view unit = units[2];
+  const Real metres = unit == "mm" ? 1e-3 : unit == "cm" ? 1e-2 : unit == "m" ? 1 : 0;
+  if (metres == 0) r.wrong(title + 4, fmt::format("found the unit {}, wanted mm, cm or m", quote(unit)));
+  for (std::size_t k = 2; k < columns.size(); ++k) {
+    if (columns[k].size() != 1 || columns[k][0] != "XYZ"[(k - 2) % 3]) r.wrong(title + 3, fmt::format("field {} is {}, wanted {}", k + 1, quote(columns[k]), "XYZ"[(k - 2) % 3]));
+    if (units[k] != unit) r.wrong(title + 4, fmt::format("field {} is {}, wanted {} as the first is", k + 1, quote(units[k]), unit));
+    if (k % 3 != 2) continue;
+    if (names[k].empty()) r.wrong(title + 2, fmt::format("names no marker in field {}, wanted one in every third from the third", k + 1));
+    clip.names.emplace_back(names[k]);
+  }
+  Real first = 0;
+  for (std::size_t l = title + 5; l < lines.all.size(); ++l) {
+    if (lines.all[l].find_first_not_of(" \t,") == std::string_view::npos) break;
+    auto row = row_at(l);
+    while (row.size() > columns.size() && row.back().empty()) row.pop_back();
+    if (row.size() != columns.size()) r.wrong(l, fmt::format("has {} fields, wanted {}", row.size(), columns.size()));
+    const Real frame = r.number(l, row[0]);
+    if (clip.frames.empty()) first = frame;
+    r.check_time(l, frame / rate, clip.frames.size(), first / rate, clip.frame_time);
+    std::vector<Vec3> points;
+    for (std::size_t k = 2; k < row.size(); k += 3) points.push_back(metres * r.point(l, std::span(row).subspan(k, 3)));
+    clip.frames.push_back(std::move(points));
+  }
+  if (clip.frames.empty()) r.wrong(title + 4, "is followed by no frame, wanted at least one");
+  return clip;
+}
+
+PointClip read_csv(const Reader& r, const Lines& lines, char between) {
   if (lines.all.size() < 3) r.wrong(0, "is shorter than a header and two frames");
-  const auto header = fields(lines.all[0], ',');
+  const auto header = fields(lines.all[0], between);
   if (lower(std::string(header[0])) != "time" || header.size() < 4 || header.size() % 3 != 1) r.wrong(0, fmt::format("begins with {} and has {} fields, wanted time, name.x, name.y, name.z, ...", quote(header[0]), header.size()));
   PointClip clip;
   for (std::size_t k = 1; k < header.size(); k += 3) {
@@ -120,7 +211,7 @@ PointClip read_csv(const Reader& r, const Lines& lines) {
   }
   Real first = 0;
   for (std::size_t l = 1; l < lines.all.size(); ++l) {
-    const auto row = fields(lines.all[l], ',');
+    const auto row = fields(lines.all[l], between);
     if (row.size() != header.size()) r.wrong(l, fmt::format("has {} fields, wanted {} as in the header", row.size(), header.size()));
     const Real time = r.number(l, row[0]);
     if (l == 1) first = time;
@@ -141,8 +232,12 @@ PointClip read_points(const std::filesystem::path& file) {
   const Reader reader{file.string()};
   const Lines lines(bytes);
   if (extension == ".trc") return read_trc(reader, lines);
-  if (extension == ".csv") return read_csv(reader, lines);
-  throw InputError(Place{file.string()}, fmt::format("is a {} file, wanted trajectories of markers: .trc or .csv", extension));
+  if (extension != ".csv" && extension != ".tsv" && extension != ".txt") throw InputError(Place{file.string()}, fmt::format("is a {} file, wanted trajectories of markers: .trc, .csv, .tsv or .txt", extension));
+  const char between = extension == ".csv" ? ',' : '\t';
+  if (!lines.all.empty() && fields(lines.all[0], '\t')[0] == kFrames) return read_tracked(reader, lines);
+  for (std::size_t l = 0; l < lines.all.size(); ++l)
+    if (fields(lines.all[l], between)[0] == kSection) return read_section(reader, lines, l, between);
+  return read_csv(reader, lines, between);
 }
 
 }  // namespace effuse::importers
