@@ -31,7 +31,7 @@ bool beside_body(const ParticleSystem& s, std::size_t i) {
 
 std::vector<Mat3> even_pressure_factors(const ParticleSystem& s, std::span<const Real> off) {
   CHECK_EQ(off.size(), s.size());
-  if (s.movable.empty()) return {};
+  if (std::none_of(s.walls->walls.begin(), s.walls->walls.end(), [](const Wall& wall) { return wall.movable != kNotMovable; })) return {};
   std::vector<Mat3> factors(s.size(), Mat3::Zero());
   with_kernel(s, [&](const auto& kernel, auto periodic) {
     parallel_for(s.size(), [&](std::size_t i) {
@@ -58,24 +58,26 @@ std::vector<Mat3> even_pressure_factors(const ParticleSystem& s, std::span<const
 void even_pressure(const ParticleSystem& s, std::span<const Real> off, std::span<const Real> q, std::span<Vec3> a) {
   CHECK_EQ(q.size(), s.size());
   CHECK_EQ(a.size(), s.size());
-  if (s.movable.empty()) return;
   ZONE("sph.even out");
   const std::vector<Mat3> factors = even_pressure_factors(s, off);
-  std::vector<std::uint8_t> corrected(s.size());
-  for (std::size_t i = 0; i < s.size(); ++i) corrected[i] = !factors[i].isZero(0);
+  if (factors.empty()) return;
+  // Those that are corrected, and their neighbours, which the pairs push back.
+  std::vector<std::uint8_t> pushed(s.size());
+  for (std::size_t i = 0; i < s.size(); ++i) {
+    if (factors[i].isZero(0)) continue;
+    pushed[i] = 1;
+    for (const Index j : (*s.neighbors)[i]) pushed[j] = 1;
+  }
   with_kernel(s, [&](const auto& kernel, auto periodic) {
     parallel_for(s.size(), [&](std::size_t i) {
+      if (!pushed[i]) return;
       Vec3 sum = Vec3::Zero();
-      bool any = false;
       for (const Index j : (*s.neighbors)[i]) {
-        if (!corrected[i] && !corrected[j]) continue;
         const Vec3 d = s.template separation<decltype(periodic)::value>(i, j);
         const Real r = d.norm();
-        if (!(r > 0)) continue;
-        sum += (q[i] + q[j]) * s.volume() * kernel.dW(r) / r * ((factors[i] + factors[j]) * d);
-        any = true;
+        if (r > 0) sum += (q[i] + q[j]) * s.volume() * kernel.dW(r) / r * ((factors[i] + factors[j]) * d);
       }
-      if (any) a[i] -= mirrored(s, i) * sum / 2;
+      a[i] -= mirrored(s, i) * sum / 2;
     }, 256);
   });
 }

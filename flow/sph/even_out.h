@@ -39,7 +39,7 @@ void even_out(const ParticleSystem& system, std::span<const Real> off, std::span
 /// Source of the symmetric form: Bonet & Lok 1999, Comput. Methods Appl. Mech. Eng. 180, 97-115, whose gradient this corrects alike.
 void even_pressure(const ParticleSystem& system, std::span<const Real> off, std::span<const Real> q, std::span<Vec3> a);
 
-/// R of every particle; empty where no body is.
+/// R of every particle; empty where no body is beside any.
 std::vector<Mat3> even_pressure_factors(const ParticleSystem& system, std::span<const Real> off);
 
 }  // namespace effuse::flow::sph

@@ -161,7 +161,7 @@ Sinking sink_ball(Real share, Real fine) {
   return result;
 }
 
-// Wanted within 10 %: -6.8 % from this start (-24.9 % without even_out.h), -9.3 % at 4.5 spacings to its radius (-19.1 %). Its start changes little:
+// Wanted within 10 %: -6.8 % from this start (-24.9 % without even_out.h), -8.2 % at 4.5 spacings to its radius (-19.1 %). Its start changes little:
 // -7.1 % in lava that fills all but the ball's volume. Depth does: from such a start, mean of 9 to 18 s, it is off by +7 % 3.1 radii below the
 // surface, -7 % at 4.8 and -27 % at 6.8 (without even_out.h -8, -29 and -48 %). That is the mark of the background pressure, which pushes unevenly
 // where shear has drawn the particles' pattern out; pressure in a solved flow is otherwise of no account. What is left of it grows with depth still.
