@@ -9,6 +9,7 @@
 #include "flow/sph/awake.h"
 #include "flow/sph/density.h"
 #include "flow/sph/emitter.h"
+#include "flow/sph/even_out.h"
 #include "flow/sph/material_frame.h"
 #include "flow/sph/pair_kernels.h"
 #include "flow/sph/particle_system.h"
@@ -401,6 +402,7 @@ struct ModernLava::Impl {
     for (int round = 0; round < o.coupling; ++round) {
       solids.restart(dt);
       pressure_acceleration(s, lq, predicted);
+      even_pressure(s, shape.off, lq, predicted);
       push_movables(s, lq, predicted, dt);
       parallel_for(m, [&](std::size_t k) { predicted[k] = s.is_fixed(k) ? start[k] : Vec3(start[k] + dt * (predicted[k] + o.gravity)); }, 2048);
       const ViscosityResult viscous = !o.guards.implicit_viscosity ? explicit_viscosity(s, dt) : viscosity.solve(s, o.density, lmu, o.slip_length, dt, predicted, o.viscosity_tolerance, o.max_iterations, lv, scale);
@@ -434,6 +436,7 @@ struct ModernLava::Impl {
         if (far > farthest) shift[k] *= farthest / far;
       }, 2048);
     }
+    even_out(s, shape.off, lv, dt, shift);
     const Real limit = o.spacing / 2;
     return !o.guards.step_limit || parallel_max(m, 0, [&](std::size_t k) {
              const Vec3 path = dt * lv[k] + shift[k];

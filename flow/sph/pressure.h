@@ -16,7 +16,7 @@ namespace effuse::flow::sph {
 ///
 /// the exact rate of the density summed over neighbours; beyond a wall the fluid moves as the mirror image.
 /// Of a linear v it is -tr(grad v) on a lattice; in disorder -V sum F d d^T is not quite unity, and the shear rate adds its share: a flow
-/// that is made to fulfil D v = 0 is dragged harder by that. Small bodies feel it most (solids.h).
+/// that is made to fulfil D v = 0 under pressure is dragged harder by that. Small bodies feel it most (even_out.h).
 void compression_rate(const ParticleSystem& system, std::span<const Vec3> v, std::span<Real> out);
 
 /// Walls that mirror (Wall::mirrors) have their mirror image counted in full: what flows along them counts for the lava's half of the

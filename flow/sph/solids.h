@@ -62,8 +62,8 @@ struct SolidOptions {
 ///
 /// Known limits: at the inner edges of a vessel the sums still miss a little; lava at rest in it creeps round by 0.03 g spacing^2 / nu, a
 /// hundredth on the mean. A duct 3 by 5 particles wide lets through 8 % too much, one 3 by 10 wide 2 %. Things whose size is a kernel's are
-/// felt too strongly: a ball 3 spacings in radius, lava settled around it, is dragged 1.4 times as hard as Stokes and Haberman say and lifted
-/// by 0.82 of what it displaces (0.87 at 5 spacings, 0.89 at 6), so that it sinks a quarter to two fifths too slowly (why: pressure.h).
+/// felt too strongly where lava is deep: a ball 3 spacings in radius sinks within 10 % of what Stokes and Haberman say down to 5 radii below the
+/// surface, a quarter too slowly at 7 (why: even_out.h). Held still it is lifted by 0.82 of what it displaces (0.87 at 5 spacings, 0.89 at 6).
 class Solids {
  public:
   /// radius: particles' centres stay so far off surfaces where there is room [m]. mass: of a particle [kg]. widest: of walls face to

@@ -161,27 +161,17 @@ Sinking sink_ball(Real share, Real fine) {
   return result;
 }
 
-// Wanted within 10 %: it sinks 25 to 31 % too slowly in this tube, by where it starts, 19 % at 4.5 spacings to its radius, and 39 % in a tube
-// four times as wide at 3: the walls of the tube are not what holds it. Held still in lava that has settled, it is lifted by 0.82 of what it
-// displaces at 3 spacings, 0.87 at 5 and 0.89 at 6, and moved along, dragged 1.4 times as hard as it should be at 3; among particles that
-// still lie on their lattice 0.9 times. None of this changes it by more than a tenth: steps a quarter as long, several rounds of both solves,
-// tighter tolerances, walls without mirrors or the factor of channels, no shift of density, no filling up once the lava has settled. (Without
-// any from the start it sinks 21 % too fast at 3 and 7 % too fast at 4.5, in lava that has stayed 8 % too thin.) Walls not bent for the ball's
-// curvature drag an eighth harder. A plane film in disorder flows 5 to 10 % too slowly.
-//
-// Much of it is the rate of compression (pressure.h): of a linear flow free of divergence it is zero on a lattice only. In disorder, and beside a
-// curved wall, it is the shear rate times what the particle's sum V grad W d^T misses of unity; lava yields to that at the cost of power. With
-// rows of D multiplied by the inverse of that sum, its walls' part included, for all particles from 16 s on, the ball goes from 0.83 of the exact
-// speed to 1.13 within a step, and is at 1.00 at 20.5 s, where it is at 0.73 without (it slows down all the while, which is not explained); with
-// such rows beside all obstacles from the start it is at 0.97 at 15 s, without at 0.86. But then D^T no longer has the gradient of
-// hydrostatic pressure: ducts let through 8 to 12 % too much, lava at rest in a vessel creeps twice as fast, and, with such rows beside bodies
-// only, blocks of 0.3, 0.6 and 0.8 of the lava's density float 0.27, 0.55 and 0.89 deep and this ball is no faster at 15 s. One matrix a
-// particle makes D exact or D^T, not both while they are transposes; lift and rest were given the preference. Not explained by it: lava a tenth
-// as viscous drags the ball 3.2 times as hard as it should (Re 0.03).
+// Wanted within 10 %: -6.8 % from this start (-24.9 % without even_out.h), -8.2 % at 4.5 spacings to its radius (-19.1 %). Its start changes little:
+// -7.1 % in lava that fills all but the ball's volume. Depth does: from such a start, mean of 9 to 18 s, it is off by +7 % 3.1 radii below the
+// surface, -7 % at 4.8 and -27 % at 6.8 (without even_out.h -8, -29 and -48 %). That is the mark of the background pressure, which pushes unevenly
+// where shear has drawn the particles' pattern out; pressure in a solved flow is otherwise of no account. What is left of it grows with depth still.
+// Not the cause, each tried by itself: impulses of particles that the ball's surface stops (3e-5 of its weight); the rate of compression
+// of a linear flow, made exact by its error in the step's right-hand side (1 %); several rounds of both solves, steps a quarter as long (a tenth at most).
+// In disorder a quarter of the lava's first spacing off the ball holds 1.5 times its share of particles: they ride with it.
 TEST(SolidWorldSlow, ABallSinksNearlyAsFastAsStokesAndHabermanSay) {
   const Sinking ball = sink_ball(0.5, 3);
   EXPECT_LT(ball.reynolds, 0.1);
-  EXPECT_NEAR(ball.speed, ball.exact, 0.3 * ball.exact);
+  EXPECT_NEAR(ball.speed, ball.exact, 0.1 * ball.exact);
 }
 
 TEST(SolidWorldSlow, AFloatingBlockDrawsWhatArchimedesSays) {
