@@ -8,7 +8,7 @@
 namespace effuse::flow {
 
 namespace {
-constexpr Real kFronts[] = {0.08, 0.04, 0.025};
+constexpr Real kFronts[] = {0.08, 0.025, 0.02};
 constexpr const char* kNames[] = {"none", "draft", "normal", "fine"};
 constexpr Real kLeast = 0.015;
 }  // namespace
@@ -18,7 +18,7 @@ Real least_front_error() { return kLeast; }
 
 std::optional<AccuracyWish> read_accuracy(Parameters& root) {
   const std::vector<std::string> names(std::begin(kNames), std::end(kNames));
-  const std::size_t quality = root.choice("quality", names, 0, "how right lava is to be, its front's error over the film: draft about 8 %, normal 4 %, fine 2.5 %; chooses the spacing, step, tolerances and voxels that the scene leaves open. none: nothing is chosen");
+  const std::size_t quality = root.choice("quality", names, 0, "how right lava is to be, its front's error over the film: draft about 8 %, normal 2.5 %, fine 2 %; chooses the spacing, step, tolerances and voxels that the scene leaves open. none: nothing is chosen");
   Parameters table = root.table("accuracy", "how right lava is to be, by a number");
   const Real front = table.number("front", "", 0, {0, 0.5}, "wanted error of the lava's front, 1.5 % and more: of the distance from the nearest vent within which all but half a per cent of it lies, root mean square over the film; 0: nothing is chosen");
   if (quality > 0 && front > 0) table.fault("front", "the scene has a quality, too, wanted one of the two");

@@ -298,19 +298,16 @@ Real covered_area(const geometry::Points& points) {
 
 std::optional<Front> find_front(const geometry::Points& points, std::span<const PlanLine> vents) {
   if (points.size() == 0 || vents.empty()) return std::nullopt;
-  struct Far {
-    Real distance;
-    std::size_t p;
-  };
-  const Far far = parallel_reduce(
-      points.size(), Far{-1, 0},
-      [&](std::size_t p) {
-        Real nearest = std::numeric_limits<Real>::infinity();
-        for (const PlanLine& vent : vents) nearest = std::min(nearest, distance(points.position[p].head<2>(), vent));
-        return Far{nearest, p};
-      },
-      [](const Far& a, const Far& b) { return b.distance > a.distance ? b : a; });
-  return Front{far.distance, points.position[far.p].head<2>()};
+  const std::size_t n = points.size();
+  std::vector<std::pair<Real, std::size_t>> far(n);  // minus the distance, particle: the farthest first, and the first of equals
+  parallel_for(n, [&](std::size_t p) {
+    Real nearest = std::numeric_limits<Real>::infinity();
+    for (const PlanLine& vent : vents) nearest = std::min(nearest, distance(points.position[p].head<2>(), vent));
+    far[p] = {-nearest, p};
+  }, 2048);
+  const auto at = far.begin() + static_cast<std::ptrdiff_t>(kBeyondFront * static_cast<Real>(n));
+  std::nth_element(far.begin(), at, far.end());
+  return Front{-at->first, points.position[at->second].head<2>()};
 }
 
 }  // namespace effuse::flow::sph

@@ -113,12 +113,16 @@ struct PlanLine {
   Vec2 from = Vec2::Zero(), to = Vec2::Zero();
 };
 
-/// The particle farthest from where lava comes out, seen from above.
+/// How far lava has come from where it comes out, seen from above: the distance within which all but kBeyondFront of its volume lies, and
+/// the particle there. Unlike the farthest particle's, which may be one that fell ahead, it is a property of the flow: two spacings of
+/// particles have it in common once they have the flow in common.
 struct Front {
   Real distance = 0;       ///< from the nearest of the lines [m], straight: not along the flow's bends
-  Vec2 at = Vec2::Zero();  ///< its centre [m]
+  Vec2 at = Vec2::Zero();  ///< the particle's centre [m]
 };
-/// nullopt without particles or without lines. The first of equals.
+inline constexpr Real kBeyondFront = 0.005;  ///< of the volume; of fewer than 200 particles none
+/// All particles count alike: they are of one volume (those of a lava are). nullopt without particles or without lines. The first of
+/// equals. The same on any number of threads.
 std::optional<Front> find_front(const geometry::Points& points, std::span<const PlanLine> vents);
 
 }  // namespace effuse::flow::sph

@@ -17,8 +17,6 @@ namespace effuse::budget {
 
 namespace {
 
-constexpr Real kBeyond = 0.005;  // of the particles, farther than the front
-
 /// Processor time of this thread [s].
 Real thread_time() {
   timespec now{};
@@ -49,28 +47,7 @@ flow::Scene lava_alone(const flow::Node& scene, Real spacing, Real& support) {
   return alone;
 }
 
-Real distance_in_plan(const Vec3& x, const flow::sph::PlanLine& line) {
-  const Vec2 p = x.head<2>() - line.from, along = line.to - line.from;
-  const Real length2 = along.squaredNorm();
-  return (p - (length2 > 0 ? std::clamp(p.dot(along) / length2, 0.0, 1.0) : 0) * along).norm();
-}
-
 }  // namespace
-
-Real front_of(const geometry::Points& points, std::span<const flow::sph::PlanLine> vents) {
-  const std::size_t n = points.size();
-  if (n == 0 || vents.empty()) return 0;
-  std::vector<Real> far(n);
-  parallel_for(n, [&](std::size_t i) {
-    Real nearest = std::numeric_limits<Real>::infinity();
-    for (const flow::sph::PlanLine& vent : vents) nearest = std::min(nearest, distance_in_plan(points.position[i], vent));
-    far[i] = nearest;
-  });
-  const auto beyond = static_cast<std::size_t>(kBeyond * static_cast<Real>(n));
-  const auto at = far.end() - 1 - static_cast<std::ptrdiff_t>(beyond);
-  std::nth_element(far.begin(), at, far.end());
-  return *at;
-}
 
 Real mean_neighbors(const geometry::Points& points, Real reach, std::size_t samples) {
   const std::size_t n = points.size(), count = std::min(n, samples);
@@ -114,7 +91,7 @@ Rehearsal rehearse(const flow::Node& scene, const flow::World& world, Real spaci
     std::map<std::string, Real> figures;
     for (const auto& [name, value] : lava.figures()) figures[name] = value;
     const geometry::Points points = lava.points();
-    now.front = front_of(points, vents);
+    if (const auto front = flow::sph::find_front(points, vents)) now.front = front->distance;
     now.particles = static_cast<Real>(points.size());
     now.layers = points.size() > 0 ? lava.volume() / (flow::sph::covered_area(points) * spacing) : 0;
     now.bytes = static_cast<Real>(lava.memory());

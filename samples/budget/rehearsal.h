@@ -36,7 +36,7 @@ struct Counts {
 /// A frame's end.
 struct Moment {
   Real time = 0;       ///< [s]
-  Real front = 0;      ///< [m], front_of
+  Real front = 0;      ///< [m], flow::sph::find_front's distance; 0 without particles
   Real particles = 0;
   Real layers = 0;     ///< volume over covered area and spacing; 0 without particles
   Real bytes = 0;      ///< of the solver's state
@@ -50,10 +50,6 @@ struct Rehearsal {
   std::vector<Vec3> at_the_end; ///< the particles of the last moment [m]
   bool whole = false;           ///< it came to the film's end
 };
-
-/// Distance in plan from the nearest of the lines within which all but half a per cent of the particles lie [m]: unlike that of the
-/// farthest one it converges. 0 without particles or lines.
-Real front_of(const geometry::Points& points, std::span<const flow::sph::PlanLine> vents);
 
 /// Mean number of others within reach [m] of a particle, over at most `samples` of them, evenly chosen.
 Real mean_neighbors(const geometry::Points& points, Real reach, std::size_t samples = 128);

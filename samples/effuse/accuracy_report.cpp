@@ -30,7 +30,7 @@ CameTo came_to(const LoadedScene& loaded, const std::filesystem::path& folder) {
     std::vector<flow::sph::PlanLine> vents;
     for (const flow::Opening& opening : effect->openings()) vents.push_back({opening.from.head<2>(), opening.to.head<2>()});
     const geometry::Points points = effect->points();
-    c.front = budget::front_of(points, vents);
+    if (const auto front = flow::sph::find_front(points, vents)) c.front = front->distance;
     c.particles = static_cast<double>(points.size());
     for (const auto& [name, value] : effect->figures())
       if (name == "steps") c.steps = value;

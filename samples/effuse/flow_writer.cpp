@@ -25,7 +25,7 @@ using Layer = FlowMap::Layer;
 
 namespace {
 
-constexpr std::string_view kMagic = "effuse flow record 3";
+constexpr std::string_view kMagic = "effuse flow record 4";
 constexpr const char* kHeader =
     "frame,time_s,front_m,front_x,front_y,inundated_m2,covered_m2,volume_m3,discharge_m3_s,max_speed_m_s,mean_temperature_K,max_temperature_K,min_temperature_K";
 constexpr const char* kHeatBudget[] = {"radiated_J", "convected_J", "ground_J", "vent_J", "stored_J", "viscous_J", "left_J"};

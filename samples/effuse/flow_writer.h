@@ -23,7 +23,8 @@ namespace effuse {
 ///
 /// Columns of flow.csv; a field is empty where the effect does not say, or where there is nothing to say it of:
 ///   frame, time_s
-///   front_m, front_x, front_y   the particle farthest from the nearest vent, seen from above, straight; map coordinates
+///   front_m, front_x, front_y   distance from the nearest vent, seen from above, straight, within which all but half a per cent of the
+///                               volume lies (flow::sph::find_front), and the particle there; map coordinates
 ///   inundated_m2                cells of the map reached so far (as arrival_time has them), whole: cells much wider than
 ///                               particles read high (Maunga Whau at its end, 10 m cells, particles of 1.35 m: 19,200
 ///                               where 15,300 are covered; output.map_cell)

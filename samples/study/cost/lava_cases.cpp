@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 
+#include "flow/sph/flow_map.h"
 #include "geometry/base/hash.h"
 #include "geometry/base/parallel.h"
 #include "samples/study/cost/cost.h"
@@ -216,20 +217,19 @@ CaseResult stiffness(bool full) {
   return result;
 }
 
-/// Area covered [m^2], in squares of 5 m, and how far from its middle the lava has come [m], to the last hundredth.
+/// Area covered [m^2], in squares of 5 m, and the front [m], as flow.csv has it.
 struct Reach {
   Real area = 0, front = 0;
 };
-Reach reach_of(std::span<const Vec3> x, const Vec2& vent) {
+Reach reach_of(const flow::Effect& lava) {
   constexpr Real kSquare = 5;
   std::set<std::pair<long, long>> squares;
-  std::vector<Real> far;
-  for (const Vec3& p : x) {
-    squares.insert({std::lround(p.x() / kSquare), std::lround(p.y() / kSquare)});
-    far.push_back((p.head<2>() - vent).norm());
-  }
-  std::sort(far.begin(), far.end());
-  return {kSquare * kSquare * static_cast<Real>(squares.size()), far.empty() ? 0 : far[far.size() - 1 - far.size() / 200]};
+  const geometry::Points points = lava.points();
+  for (const Vec3& p : points.position) squares.insert({std::lround(p.x() / kSquare), std::lround(p.y() / kSquare)});
+  std::vector<flow::sph::PlanLine> vents;
+  for (const flow::Opening& opening : lava.openings()) vents.push_back({opening.from.head<2>(), opening.to.head<2>()});
+  const auto front = flow::sph::find_front(points, vents);
+  return {kSquare * kSquare * static_cast<Real>(squares.size()), front ? front->distance : 0};
 }
 
 CaseResult mountain_spacing(bool full) {
@@ -249,9 +249,7 @@ CaseResult mountain_spacing(bool full) {
       CostRun run;
       run.seconds = processor_time() - before;
       const flow::Effect& lava = *loaded->simulation->effects().front();
-      const geometry::Points points = lava.points();
-      const Vec2 origin = loaded->terrain->georeference().origin.head<2>();
-      reach = reach_of(points.position, Vec2(2667710, 6479197.5) - origin);
+      reach = reach_of(lava);
       for (const auto& [name, value] : lava.figures())
         if (name == "steps") run.steps = static_cast<std::uint64_t>(value);
       run.memory = lava.memory();

@@ -322,7 +322,7 @@ TEST(CoveredArea, OfADiskOfLavaIsItsOwn) {
   EXPECT_NEAR(covered_area(disk.points()) / (kPi * 30 * 30), 1, 2 * 0.5 / 30);
 }
 
-TEST(Front, IsTheFarthestParticleFromTheNearestVent) {
+TEST(Front, OfFewParticlesIsTheFarthestFromTheNearestVent) {
   Cloud cloud;
   const std::vector<PlanLine> vents = {{Vec2(0, 0), Vec2(10, 0)}, {Vec2(100, 0), Vec2(100, 0)}};
   EXPECT_FALSE(find_front(cloud.points(), vents));
@@ -336,6 +336,16 @@ TEST(Front, IsTheFarthestParticleFromTheNearestVent) {
   EXPECT_EQ(front->at, Vec2(5, 8));
   front = find_front(cloud.points(), std::span(vents).first(1));
   EXPECT_DOUBLE_EQ(front->distance, std::hypot(86, 3));
+}
+
+TEST(Front, LeavesOutTheFarthestHalfPercentOfTheVolume) {
+  Cloud cloud;
+  for (int k = 1; k <= 1000; ++k) cloud.add(k, 5);  // 1 .. 1000 m from the line
+  const std::vector<PlanLine> line = {{Vec2(0, 0), Vec2(0, 10)}};
+  EXPECT_EQ(find_front(cloud.points(), line)->distance, 995);
+  EXPECT_EQ(find_front(cloud.points(), line)->at, Vec2(995, 5));
+  cloud.x[3].x() = 1e6;
+  EXPECT_EQ(find_front(cloud.points(), line)->distance, 996) << "one that flew off moves it by one";
 }
 
 }  // namespace

@@ -16,23 +16,10 @@
 namespace effuse::budget {
 namespace {
 
-const flow::sph::PlanLine kLine{Vec2(0, 0), Vec2(0, 10)};
-
 geometry::Points at(const std::vector<Vec3>& x) {
   geometry::Points points;
   points.position = x;
   return points;
-}
-
-TEST(FrontOf, LeavesOutTheFarthestHalfPercent) {
-  std::vector<Vec3> x;
-  for (int k = 1; k <= 1000; ++k) x.push_back(Vec3(k, 5, 0));  // 1 .. 1000 m from the line
-  EXPECT_EQ(front_of(at(x), std::vector{kLine}), 995);
-  x[3] = Vec3(1e6, 5, 0);
-  EXPECT_EQ(front_of(at(x), std::vector{kLine}), 996) << "one that flew off moves it by one";
-  EXPECT_EQ(front_of(at({Vec3(3, 14, 7)}), std::vector{kLine}), 5) << "seen from above, from the line's end";
-  EXPECT_EQ(front_of(at({}), std::vector{kLine}), 0);
-  EXPECT_EQ(front_of(at(x), {}), 0);
 }
 
 TEST(MeanNeighbors, CountsThoseWithinReachOnALattice) {
