@@ -78,6 +78,7 @@ Material::Sample Material::at(const Vec3& x) const {
   if (!(weight > 0)) return out;
 
   out.any = true;
+  out.weight = weight;
   out.temperature = temperature / weight;
   out.crust = crust / weight;
   const Vec3 d_mean = d_sum / weight;

@@ -29,6 +29,7 @@ class Material {
 
   struct Sample {
     bool any = false;                   ///< a particle within reach; if not, nothing else is set
+    Real weight = 0;                    ///< sum of w: at a reach of 2.5, 0.8 on a lone particle's drop, 1.2 at a corner, 2.5 at an edge, 5 on a face
     Vec3 outward = Vec3::Zero();        ///< x - xbar [m]: at the surface of a body of particles, out of it; 0.3 spacings long or more
     Vec3 rest[2];                       ///< of the two material frames [m]; x itself for a frame that the points do not have
     Mat3 slope[2];                      ///< d rest / dx; the unit matrix for such a frame

@@ -20,6 +20,8 @@ constexpr Real kMeanFragment = 0.185;  // of fragments(): measured, see the test
 constexpr Real kFragment = 1.9;        // [spacings] size of the largest fragments
 constexpr Real kFragmentFiner = 0.56, kFragmentGain = 0.65;
 constexpr Real kMostDisplaced = 0.35;  // [spacings]
+constexpr Real kOnDrop = 0.35;         // of the height, on a lone particle: a fifth of its radius at most
+constexpr Real kDrop = 0.9, kBody = 2.2;  // Material's weights there, and at a body's edges
 
 /// n's picture under the linear map A of its tangent plane, unit: the cross product of two mapped tangents; n where A has none.
 Vec3 mapped_normal(const Mat3& A, const Vec3& n) {
@@ -35,6 +37,9 @@ Vec2 across(const Vec3& n, const Vec3& d) {
   const Vec3 a(1 - n.x() * n.x() * s, q, -n.x()), b(q, 1 - n.y() * n.y() * s, -n.y());
   return Vec2(a.dot(d), b.dot(d));
 }
+
+/// Share of the height that what lies under the surface has room for.
+Real permitted(Real weight) { return kOnDrop + (1 - kOnDrop) * smoothstep(kDrop, kBody, weight); }
 
 }  // namespace
 
@@ -126,7 +131,7 @@ Relief::Sample Relief::at(const Vec3& x, Real edge) const {
   }
   // Soft limits: no kink where they are reached.
   const Real most = kMostDisplaced * o_.spacing;
-  sample.height = most * std::tanh(o_.amplitude * o_.spacing * sample.height / most);
+  sample.height = permitted(here.m.weight) * most * std::tanh(o_.amplitude * o_.spacing * sample.height / most);
   sample.detail = std::clamp(sample.detail, Real{-1}, Real{1});
   sample.cold = here.cold;
   return sample;

@@ -206,12 +206,13 @@ bool widen(const Blocks& blocks, float outside, const Field& phi, const std::vec
     for (std::size_t slot = 0; slot < 27; ++slot) {
       if (blocks.around(b)[slot] != kNone) continue;
       const int d[3] = {static_cast<int>(slot / 9) - 1, static_cast<int>(slot / 3 % 3) - 1, static_cast<int>(slot % 3) - 1};
+      // Of the face, edge or corner on that side alone.
+      const auto first = [&](int a) { return d[a] > 0 ? kSide - 1 : 0; };
+      const auto end = [&](int a) { return d[a] < 0 ? 1 : kSide; };
       bool touches = false;
-      for (std::size_t v = 0; v < kVoxels && !touches; ++v) {
-        const int x[3] = {static_cast<int>(v >> 6), static_cast<int>((v >> 3) & 7), static_cast<int>(v & 7)};
-        touches = phi[b * kVoxels + v] < 0;
-        for (int a = 0; a < 3; ++a) touches = touches && (d[a] == 0 || x[a] == (d[a] < 0 ? 0 : kSide - 1));
-      }
+      for (int i = first(0); i < end(0) && !touches; ++i)
+        for (int j = first(1); j < end(1) && !touches; ++j)
+          for (int k = first(2); k < end(2) && !touches; ++k) touches = phi[b * kVoxels + voxel_index(i, j, k)] < 0;
       const BlockCoord& c = blocks.coords()[b];
       if (touches) coords.push_back({c[0] + d[0], c[1] + d[1], c[2] + d[2]});
     }

@@ -29,6 +29,7 @@ constexpr int kMostSteps = 6;                     // two or three serve almost e
 constexpr float kCloseEnough = 5e-4f;             // [spacings]
 constexpr float kMostMoved = 0.5f, kFreely = 0.25f;  // [spacings] points go so far, and up to this all the way
 constexpr float kLeastSlope = 0.3f, kFullSlope = 0.5f;  // where the field is flatter it is a crease, a neck or a thin sheet
+constexpr float kLeastSlant = 0.5f;               // cosine between a line and the normal
 constexpr float kGathered = 0.15f;                // [spacings] particles are looked for anew when a point has gone so far
 constexpr float kSoft = 0.04f;                    // [spacings] how round balls meet one another
 constexpr float kBound = 1.15f, kBoundSlope = 3;  // as in rasterize.cpp
@@ -177,9 +178,12 @@ ParticleSurface::ParticleSurface(const LevelSet& surface) : surface_(surface) {
   ball_ = s.rule.kernel == SurfaceKernel::kRound ? ball_radii(s.particles, s.rule.cover) : std::vector<float>(s.particles.size(), 0);
 }
 
-void ParticleSurface::project(std::span<Vec3> x, std::span<Vec3> normals) const {
+/// along(i, n): the direction in which point i goes where the field's unit gradient is n.
+template <class F>
+void ParticleSurface::move(std::span<Vec3> x, std::span<Vec3> normals, std::span<Real> share, F&& along) const {
   ZONE("skin.particle_surface");
   CHECK_EQ(x.size(), normals.size());
+  std::fill(share.begin(), share.end(), Real{0});
   const LevelSet::Impl& s = surface_.impl();
   if (s.particles.size() == 0 || s.rule.kernel != SurfaceKernel::kRound) return;
   const Stencil stencil(s.rule);
@@ -210,8 +214,12 @@ void ParticleSurface::project(std::span<Vec3> x, std::span<Vec3> normals) const 
         slope = length;
         normal = now.gradient / length;
         frame = now.smooth.normalized();
-        const float way = (now.value - level) / length;
-        at -= way * normal;
+        const Vector3f direction = along(i, normal);
+        const float slant = direction.dot(normal);
+        good = slant > kLeastSlant;
+        if (!good) break;
+        const float way = (now.value - level) / (length * slant);
+        at -= way * direction;
         close = std::abs(way) < kCloseEnough * d;
         good = at.norm() < most;
         if (good && !close && (at - gathered_at).norm() > margin) gather(s, ball_, start, gathered_at = at, reach, near);
@@ -221,8 +229,21 @@ void ParticleSurface::project(std::span<Vec3> x, std::span<Vec3> normals) const 
       allowed *= smoothstep(static_cast<Real>(kLeastSlope), static_cast<Real>(kFullSlope), static_cast<Real>(slope));
       x[i] += allowed * s.voxel * at.cast<Real>();
       normals[i] = (normals[i] + allowed * (normal.cast<Real>() - normals[i])).normalized();
+      if (!share.empty()) share[i] = allowed;
     }
   });
+}
+
+Real ParticleSurface::spacing() const { return surface_.impl().spacing; }
+
+void ParticleSurface::project(std::span<Vec3> x, std::span<Vec3> normals) const {
+  move(x, normals, {}, [](std::size_t, const Vector3f& normal) { return normal; });
+}
+
+void ParticleSurface::project_along(std::span<Vec3> x, std::span<Vec3> normals, std::span<const Vec3> along, std::span<Real> share) const {
+  CHECK_EQ(x.size(), along.size());
+  CHECK(share.empty() || share.size() == x.size());
+  move(x, normals, share, [&](std::size_t i, const Vector3f&) -> Vector3f { return along[i].cast<float>(); });
 }
 
 void ParticleSurface::project(geometry::TriMesh& mesh) const {

@@ -28,11 +28,21 @@ class ParticleSurface {
   /// surface is cut and lifted, and those where f has a slope below 0.5 (creases, necks, thin sheets). Sizes must agree (checked).
   /// 2 us a point and thread. Same bits on any number of threads.
   void project(std::span<Vec3> x, std::span<Vec3> normals) const;
+  /// The same along lines: to where the line through each point along its unit vector meets the surface, so that a place said in terms of
+  /// the particles, on a line through them, is the same place however the particles lie on the voxels. Lines more than 60 degrees from the
+  /// normal: their points stay.
+  ///   share  out, if given: how much of the way each point went, 0 .. 1
+  void project_along(std::span<Vec3> x, std::span<Vec3> normals, std::span<const Vec3> along, std::span<Real> share = {}) const;
   /// The same for a mesh's vertices and normals (which it must have: checked), but no triangle is turned over: vertices of one that would
   /// be go half the way, a quarter, or stay, and keep their normals.
   void project(geometry::TriMesh& mesh) const;
+  /// Of the particles [m].
+  Real spacing() const;
 
  private:
+  template <class F>
+  void move(std::span<Vec3> x, std::span<Vec3> normals, std::span<Real> share, F&& along) const;
+
   const LevelSet& surface_;
   std::vector<float> ball_;  // radii, of sorted particles
 };

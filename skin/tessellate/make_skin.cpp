@@ -19,6 +19,8 @@ namespace {
 using geometry::TriMesh;
 
 constexpr Real kThinnest = 14;  // [deg] thinner triangles are made wider,
+constexpr Real kThinFan = 8;     // [deg] the same for fans, which have been made better once, before their vertices went to the particles' surface
+constexpr Real kFlattest = 0.6; // VoronoiOptions::flattest where fans are refined on the particles' surface: clear of the 0.71 of regions bent by 90 degrees
 constexpr Real kWander = 0.35;  // [voxels] by moving vertices so far
 
 /// Of a tessellation whose triangles have regions: a vertex on a border gets that of the smallest id.
@@ -104,11 +106,13 @@ Skin make_skin(const geometry::Points& points, Real volume, const geometry::Terr
   RefineToReport refined;
   if (voronoi) {
     const TriMesh surface = mesh_level_set(skin.surface, last);
-    Tessellation tessellation = tessellate_voronoi(surface, regions, points);
-    if (detail) {
-      refined = refine_on(tessellation, surface, fineness(*detail));
-      if (displaced) ParticleSurface(skin.surface).project(tessellation.mesh);
-    }
+    std::optional<ParticleSurface> particles;
+    if (displaced && options.level_set.kernel == SurfaceKernel::kRound) particles.emplace(skin.surface);
+    VoronoiOptions fans;
+    if (particles) fans.flattest = kFlattest;
+    Tessellation tessellation = tessellate_voronoi(surface, regions, points, fans, particles ? &*particles : nullptr);
+    if (detail) refined = refine_on(tessellation, surface, fineness(*detail), particles ? &*particles : nullptr);
+    if (particles) widen_thin(tessellation.mesh, kThinFan, kWander * detail->edge * spacing);
     lift_facets(tessellation.mesh);
     skin.report.voronoi = tessellation.report;
     skin.regions = labels_of(tessellation);
@@ -120,6 +124,8 @@ Skin make_skin(const geometry::Points& points, Real volume, const geometry::Terr
     if (displaced) ParticleSurface(skin.surface).project(skin.mesh);
   }
   const std::vector<Vec3> ways = ways_out(skin.mesh);
+  // Before it is displaced, too: relief is a function of the place, and the level set's own volume is the lattice's to a hundredth of a voxel.
+  if (displaced) match_volume(skin, ways, terrain, spacing);
   if (detail) skin.report.displace = displace_only(skin.mesh, points, terrain, *detail);
   skin.report.displace.refined = refined.rounds;
   skin.report.refined_enough = refined.enough;

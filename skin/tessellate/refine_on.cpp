@@ -8,6 +8,7 @@
 #include "geometry/base/zones.h"
 #include "skin/detail/smooth_surface.h"
 #include "skin/tessellate/improve.h"
+#include "skin/tessellate/on_particles.h"
 #include "skin/tessellate/surface_walk.h"
 
 namespace effuse::skin {
@@ -64,7 +65,7 @@ std::vector<Index> starts(const std::vector<Triangle>& before, const TriMesh& me
 
 }  // namespace
 
-RefineToReport refine_on(Tessellation& tessellation, const TriMesh& surface, const RefineOptions& options) {
+RefineToReport refine_on(Tessellation& tessellation, const TriMesh& surface, const RefineOptions& options, const ParticleSurface* particles) {
   ZONE("skin.refine_on");
   CHECK_GT(options.edge, 0.0);
   CHECK_EQ(surface.normals.size(), surface.positions.size());
@@ -79,9 +80,23 @@ RefineToReport refine_on(Tessellation& tessellation, const TriMesh& surface, con
   // the inside its middle has far to go, and would leave edges as long as before: so once, and half way to its neighbours at most.
   const SurfaceWalk walk(surface);
   Fans fans;  // no centres: any vertex may move a little
+  // On the particles' surface then, from there: how much of the way, for each vertex.
+  std::vector<Real> share;
+  std::vector<Line> lines;
+  const auto take_on = [&](std::size_t first) {
+    if (!particles) return;
+    share.resize(mesh.positions.size());
+    lines.resize(mesh.positions.size());
+    take_onto(*particles, walk, mesh.triangles, first, fans.spots, mesh.normals, lines, share);
+    for (std::size_t v = first; v < fans.spots.size(); ++v) {
+      mesh.positions[v] = fans.spots[v].x;
+      tessellation.on[v] = fans.spots[v].triangle;
+    }
+  };
   const auto settle = [&](std::size_t first) {
     const std::vector<Real> around = mean_edges(mesh);
     fans.spots.resize(mesh.positions.size());
+    lines.resize(mesh.positions.size());
     parallel_for(
         mesh.positions.size() - first,
         [&](std::size_t i) {
@@ -91,11 +106,13 @@ RefineToReport refine_on(Tessellation& tessellation, const TriMesh& surface, con
           const Vec3 way = spot.x - mesh.positions[v];
           const Real most = kMostMoved * around[v];
           if (way.squaredNorm() > most * most) spot.x = mesh.positions[v] + most * way.normalized();
+          lines[v] = {mesh.positions[v], mesh.normals[v]};
           mesh.normals[v] = walk.normal(spot);
           mesh.positions[v] = spot.x;
           tessellation.on[v] = spot.triangle;
         },
         64);
+    take_on(first);
   };
   const auto improve = [&](Real edge) {
     VoronoiOptions better;
@@ -111,13 +128,19 @@ RefineToReport refine_on(Tessellation& tessellation, const TriMesh& surface, con
       mesh.positions[v] = fans.spots[v].x;
       tessellation.on[v] = fans.spots[v].triangle;
     });
+    if (!particles) return;
+    std::fill(lines.begin(), lines.end(), Line{});
+    take_on(0);
   };
   mesh.attributes.clear();
   settle(0);
 
   RefineOptions step = options;
   step.curved = false;
-  Real edge = longest_edge(mesh), improved = edge;  // once for each length, or vertices would wander on and on
+  // Lengths that do not depend on the one longest edge there is, far away.
+  Real edge = options.edge;
+  for (const Real longest = longest_edge(mesh); edge < longest;) edge *= 2;
+  Real improved = edge;  // once for each length, or vertices would wander on and on
   for (int round = 0; round < kMostRounds; ++round) {
     edge = std::max(options.edge, edge / 2);
     step.edge = edge;
@@ -142,13 +165,20 @@ RefineToReport refine_on(Tessellation& tessellation, const TriMesh& surface, con
     }
     if (!cut.enough || (cut.rounds == 0 && edge == options.edge)) break;
   }
-  carry_over(surface, fans.spots, mesh);
 
   const SmoothSurface smooth(surface);
   parallel_for(mesh.positions.size(), [&](std::size_t v) {
     const Index corner = surface.triangles[fans.spots[v].triangle][0];
+    const Vec3 x = mesh.positions[v], n = mesh.normals[v];
+    if (particles && share[v] >= 1) return;
     smooth.project(mesh.positions[v], mesh.normals[v], smooth.pieces()[corner], smooth.edges()[corner]);
+    if (particles && share[v] > 0) {
+      mesh.positions[v] += share[v] * (x - mesh.positions[v]);
+      mesh.normals[v] = (mesh.normals[v] + share[v] * (n - mesh.normals[v])).normalized();
+    }
+    fans.spots[v] = walk.nearest(mesh.positions[v], fans.spots[v].triangle);
   });
+  carry_over(surface, fans.spots, mesh);
 
   std::vector<Index> region(mesh.triangles.size());
   for (std::size_t t = 0; t < region.size(); ++t) region[t] = tessellation.region[report.parent[t]];

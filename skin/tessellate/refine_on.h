@@ -12,11 +12,14 @@ namespace effuse::skin {
 ///
 ///   surface  the mesh given to tessellate_voronoi(), with normals (checked)
 ///   options  edge, view, most_triangles; it is always curved
+///   particles  if given, vertices lie on their surface instead, as far as it says where that is (ParticleSurface): new ones where the line through the
+///            middle of the edge, along the mean of the normals at its ends, meets it. For a tessellation made with it
 ///
 /// A cut triangle's parts are of its region (Tessellation::region, no parent needed); new vertices are no centres; attributes are those
 /// of the surface where they lie. Each round halves the longest edge, then new vertices walk from a corner of their triangle to the nearest
 /// point of the surface: never to the other side of a sheet.
 /// 3 us a vertex. Same bits on any number of threads.
-RefineToReport refine_on(Tessellation& tessellation, const geometry::TriMesh& surface, const RefineOptions& options);
+RefineToReport refine_on(Tessellation& tessellation, const geometry::TriMesh& surface, const RefineOptions& options,
+                         const ParticleSurface* particles = nullptr);
 
 }  // namespace effuse::skin

@@ -9,6 +9,7 @@
 #include "skin/tessellate/borders.h"
 #include "skin/tessellate/cells.h"
 #include "skin/tessellate/improve.h"
+#include "skin/tessellate/on_particles.h"
 #include "skin/tessellate/surface_walk.h"
 
 namespace effuse::skin {
@@ -19,6 +20,8 @@ using geometry::Triangle;
 using geometry::TriMesh;
 
 constexpr int kSteps = 8;     // from a centre's first place to the middle of its fan
+constexpr int kStraight = 3;  // walks to the point straight out
+constexpr Real kLeastSlant = 0.5;  // cosine between that way and the normal
 constexpr Real kUnfolded = 2;   // [deg] enough for a triangle that was folded
 constexpr Real kFarther = 0.8;  // [spacings] that its corners may move
 constexpr Real kLongest = 3;  // a border of a folded triangle that shrinks, in options.merge
@@ -35,14 +38,16 @@ std::vector<Index> triangle_at(const LabelledMesh& mesh, const Cells& cells) {
 
 /// Where the fans have their centres: the surface point nearest the particle, if the fan is a good one from there, else as far on the
 /// way from there to the middle of its border that makes it so.
+///   particles  if given: not the nearest point, but that outward from the particle; both on the particles' surface
 void place_centers(const LabelledMesh& mesh, const Cells& cells, std::span<const Vec3> site, const SurfaceWalk& walk, Real wanted,
-                   Fans& fans) {
+                   const ParticleSurface* particles, Fans& fans) {
   std::vector<Index> begin(cells.size() + 1, 0), own(fans.triangles.size());
   for (const Triangle& t : fans.triangles) ++begin[t[0] + 1];
   for (std::size_t c = 0; c < cells.size(); ++c) begin[c + 1] += begin[c];
   std::vector<Index> filled(begin.begin(), begin.end() - 1);
   for (Index t = 0; t < fans.triangles.size(); ++t) own[filled[fans.triangles[t][0]]++] = t;
   const std::vector<Index> start = triangle_at(mesh, cells);
+  std::vector<Line> lines(cells.size());
 
   parallel_for(
       cells.size(),
@@ -67,12 +72,29 @@ void place_centers(const LabelledMesh& mesh, const Cells& cells, std::span<const
           middle += length * (p + q) / 2;
         }
         middle = border > 0 ? Vec3(middle / border) : fans.spots[fans.triangles[fan[0]][1]].x;
+        // Outward: the vector area that the border spans, whatever lies between.
+        Vec3 outward = Vec3::Zero();
+        for (const Index t : fan) outward += (fans.spots[fans.triangles[t][1]].x - middle).cross(fans.spots[fans.triangles[t][2]].x - middle);
+        if (outward.norm() > 0) outward.normalize();
+        /// Where the line outward from a point meets the surface, nearly.
+        const auto straight_out = [&](const Vec3& at, Index first) {
+          Spot spot = walk.nearest(at, first);
+          for (int step = 0; step < kStraight; ++step) {
+            const Vec3 n = walk.normal(spot);
+            const Real slant = n.dot(outward);
+            if (slant < kLeastSlant) return spot;
+            spot = walk.nearest(at + (spot.x - at).dot(n) / slant * outward, spot.triangle);
+          }
+          return spot;
+        };
+        const auto reached = [&](const Vec3& at, Index first) { return particles ? straight_out(at, first) : walk.nearest(at, first); };
         for (const Index t : fan) reach = std::max(reach, (fans.spots[fans.triangles[t][1]].x - middle).norm());
         Spot best;
         Real most = -10;
         bool own_place = cells.whole[c];
         if (own_place) {
-          best = walk.nearest(site[cells.particle[c]], start[c]);
+          best = reached(site[cells.particle[c]], start[c]);
+          lines[c] = {site[cells.particle[c]], outward};
           // Of a region in two pieces, on a sheet's rim say, the particle may be nearest to the other one.
           own_place = (best.x - middle).norm() <= reach;
           if (own_place) most = worst(best);
@@ -81,18 +103,31 @@ void place_centers(const LabelledMesh& mesh, const Cells& cells, std::span<const
           // Towards the middle, no farther than it takes.
           const Vec3 from = own_place ? best.x : middle;
           const Index first = own_place ? best.triangle : start[c];
-          for (int step = own_place ? 1 : kSteps; step <= kSteps && most < wanted; ++step) {
-            const Spot spot = walk.nearest(from + static_cast<Real>(step) / kSteps * (middle - from), first);
+          const auto consider = [&](Real way, bool always) {
+            const Vec3 at = from + way * (middle - from);
+            const Spot spot = reached(at, first);
             const Real q = worst(spot);
-            if (q <= most && !(step == kSteps && most <= 0)) continue;
-            most = q;
-            best = spot;
+            if (q > most || always) {
+              most = q;
+              best = spot;
+              lines[c] = {at, outward};
+            }
+            return q;
+          };
+          Real before = most;  // a step ago
+          for (int step = own_place ? 1 : kSteps; step <= kSteps && most < wanted; ++step) {
+            const Real way = static_cast<Real>(step) / kSteps;
+            const Real now = consider(way, step == kSteps && most <= 0);
+            // Between two steps, so that it hangs on them continuously.
+            if (particles && now >= wanted && before < wanted && before > 0 && own_place) consider(way - (now - wanted) / (now - before) / kSteps, true);
+            before = now;
           }
         }
         fans.spots[c] = best;
         fans.up[c] = walk.normal(best);
       },
       64);
+  if (particles) take_onto(*particles, walk, std::span(fans.spots).first(cells.size()), std::span(fans.up).first(cells.size()), lines);
 }
 
 void measure(const Fans& fans, VoronoiReport& report) {
@@ -115,7 +150,7 @@ void measure(const Fans& fans, VoronoiReport& report) {
 }  // namespace
 
 Tessellation tessellate_voronoi(const TriMesh& surface, const Regions& regions, const geometry::Points& points,
-                                const VoronoiOptions& options) {
+                                const VoronoiOptions& options, const ParticleSurface* particles) {
   ZONE("skin.voronoi");
   CHECK_EQ(regions.size(), points.size());
   CHECK(options.refinement >= 0 && options.refinement <= 4);
@@ -128,7 +163,7 @@ Tessellation tessellate_voronoi(const TriMesh& surface, const Regions& regions, 
   LabelledMesh labelled = label_surface(surface, regions, points.position, options.refinement);
   const Cells cells = cut_into_discs(labelled, points.position, spacing, options);
   const SurfaceWalk walk(surface);
-  const Borders borders = trace_borders(labelled, cells, regions, points.position, walk);
+  const Borders borders = trace_borders(labelled, cells, regions, points.position, walk, particles);
 
   // The fans: each border is a side of two triangles.
   Fans fans;
@@ -136,13 +171,13 @@ Tessellation tessellate_voronoi(const TriMesh& surface, const Regions& regions, 
   fans.spots.resize(fans.centers);
   for (const Node& node : borders.nodes) fans.spots.push_back(node.spot);
   fans.up.resize(fans.spots.size());
-  parallel_for(borders.nodes.size(), [&](std::size_t n) { fans.up[fans.centers + n] = walk.normal(borders.nodes[n].spot); });
+  parallel_for(borders.nodes.size(), [&](std::size_t n) { fans.up[fans.centers + n] = borders.nodes[n].up; });
   const auto node = [&](Index n) { return static_cast<Index>(fans.centers + n); };
   for (const Border& b : borders.borders) {
     fans.triangles.push_back({b.left, node(b.from), node(b.to)});
     fans.triangles.push_back({b.right, node(b.to), node(b.from)});
   }
-  place_centers(labelled, cells, points.position, walk, std::sin(options.min_angle * kPi / 180), fans);
+  place_centers(labelled, cells, points.position, walk, std::sin(options.min_angle * kPi / 180), particles, fans);
   result.report.merged = merge_short_borders(fans, walk, options.merge * spacing);
   result.report.moved = move_for_angles(fans, walk, spacing, options);
   // Where moving did not help, the border itself may be on the wrong side: longer ones go too.
@@ -155,6 +190,9 @@ Tessellation tessellate_voronoi(const TriMesh& surface, const Regions& regions, 
   unfold.min_angle = std::min(options.min_angle, kUnfolded);
   unfold.wander = std::max(options.wander, kFarther);
   result.report.moved += move_for_angles(fans, walk, spacing, unfold);
+  // What was merged or moved is where the mesh says.
+  std::vector<Real> share(fans.spots.size());
+  if (particles) take_onto(*particles, walk, fans.triangles, 0, fans.spots, fans.up, std::vector<Line>(fans.spots.size()), share);
 
   // Regions: the particles that have a cell, in rising order.
   result.particle = cells.particle;

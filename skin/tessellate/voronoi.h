@@ -8,6 +8,8 @@
 
 namespace effuse::skin {
 
+class ParticleSurface;
+
 /// Lengths in spacings (of the Regions), areas in their squares, so that one setting serves every resolution.
 struct VoronoiOptions {
   int refinement = 1;      ///< times the surface is cut finer where three regions meet, 0..4
@@ -61,6 +63,9 @@ struct Tessellation {
 ///   surface  closed, oriented, manifold (checked along borders), edges about half a spacing or less; attributes and normals
 ///            are carried over, linear in its triangles. From mesh_level_set.
 ///   points   those of the regions, in the same order (sizes must agree, checked): their ids
+///   particles  if given, vertices lie on their surface, in places that they say: nodes where the line of equal distance from three particles
+///            meets it, centres where a line from the particle does. So a frame's fans go with lava that moves rigidly, wherever it is on the
+///            voxels, but for what the mesh alone tells: which cells meet
 /// Same bits on any number of threads and, for the same surface, in any order of the points. An empty surface gives an empty
 /// tessellation.
 ///
@@ -74,6 +79,6 @@ struct Tessellation {
 /// a third.
 /// Source: Stora, Agliati, Cani, Neyret & Gascuel 1999, Animating lava flows, Graphics Interface '99, 203-210.
 Tessellation tessellate_voronoi(const geometry::TriMesh& surface, const Regions& regions, const geometry::Points& points,
-                                const VoronoiOptions& options = {});
+                                const VoronoiOptions& options = {}, const ParticleSurface* particles = nullptr);
 
 }  // namespace effuse::skin

@@ -455,6 +455,21 @@ TEST(Relief, ALoneParticleAndNoneAtAll) {
   }
 }
 
+TEST(Relief, OnADropIsNoHigherThanAFifthOfItsRadius) {
+  Lava lava;
+  lava.add(Vec3(1, 2, 3), 900, 1);
+  for (const SkinKind kind : {SkinKind::kAa, SkinKind::kBlock}) {
+    const Relief relief(lava.points(), options_of(kind));
+    Real most = 0;
+    for (std::uint64_t i = 0; i < 200; ++i) {
+      const Vec3 way(random_normal(8, 0, i), random_normal(8, 1, i), random_normal(8, 2, i));
+      most = std::max(most, std::abs(relief.at(lava.x[0] + 0.62 * way.normalized(), 0.1).height));
+    }
+    EXPECT_LT(most, 0.2 * 0.62);
+    EXPECT_GT(most, 0.01);
+  }
+}
+
 /// A velocity that squeezes along x: folds must run across it.
 TEST(Folds, RunAcrossTheSqueezeAndFadeWithoutOne) {
   Lava lava = slab(14);

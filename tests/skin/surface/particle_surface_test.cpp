@@ -140,6 +140,34 @@ TEST(ParticleSurface, PointsOnItStay) {
   EXPECT_LT(moved.back(), 0.02);  // where balls meet, Newton's steps are short
 }
 
+TEST(ParticleSurface, PointsThatGoAlongLinesStayOnThemAndOnesAlongTheSurfaceStayWhereTheyAre) {
+  const Slab slab(7);
+  const LevelSet surface = build_level_set(slab.points(), slab.volume(), nullptr, spacing_one());
+  const ParticleSurface particles(surface);
+  std::vector<Vec3> x, n, along;
+  for (std::uint64_t i = 0; i < 200; ++i) {
+    x.emplace_back(2 + 2 * random_uniform(1, 0, i), 2 + 2 * random_uniform(1, 1, i), 2.55);  // its top is at 2.6 or so
+    n.push_back(Vec3::UnitZ());
+    along.push_back(i % 4 == 0 ? Vec3::UnitX() : Vec3(Vec3(random_uniform(1, 2, i) - 0.5, random_uniform(1, 3, i) - 0.5, 1).normalized()));
+  }
+  const std::vector<Vec3> before = x;
+  std::vector<Real> share(x.size());
+  particles.project_along(x, n, along, share);
+  std::vector<Vec3> again = x, normals = n;
+  particles.project(again, normals);
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    if (i % 4 == 0) {
+      EXPECT_EQ(x[i], before[i]);
+      EXPECT_EQ(share[i], 0);
+      continue;
+    }
+    EXPECT_EQ(share[i], 1);
+    EXPECT_LT((x[i] - before[i]).cross(along[i]).norm(), 1e-6);
+    EXPECT_LT((again[i] - x[i]).norm(), 1e-3);
+    EXPECT_NEAR(n[i].norm(), 1, 1e-9);
+  }
+}
+
 TEST(ParticleSurface, StaysWhereTheGroundCutsIt) {
   const Slab slab(7, 2);
   const geometry::Terrain ground = geometry::Terrain::from_height_field(geometry::HeightField(Vec2(-20, -20), Vec2(40, 40), 2, 2, std::vector<Real>(4, -0.5)));
