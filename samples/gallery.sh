@@ -13,6 +13,13 @@ rows=$(mktemp)
 trap 'rm -f "$rows"' EXIT
 [ $# -gt 0 ] || set -- $(cd samples/scenes && ls ./*.toml | sed 's|^\./||; s|\.toml$||')
 
+# The comment that a scene's file begins with, as one line, up to its first full stop; without one its name.
+about_of() {
+  comment=$(sed -n '/^# gallery:/d; /^#/!q; s/^# //p' "$1" | tr '\n' ' ' | sed 's/\. .*/./; s/ *$//')
+  [ -n "$comment" ] || comment=$(sed -n 's/^name = "\(.*\)"/\1/p' "$1" | head -1)
+  echo "$comment"
+}
+
 mkdir -p out/gallery
 for name in "$@"; do
   scene=samples/scenes/$name.toml
@@ -31,9 +38,7 @@ for name in "$@"; do
     ffmpeg -v error -y -i "$out/render/render.$(printf %04d "$shown").png" -q:v 3 "$picture"
   fi
   rm -r "$out"
-  # The comment that the file begins with, as one line, up to its first full stop; without one the scene's name.
-  about=$(sed -n '/^# gallery:/d; /^#/!q; s/^# //p' "$scene" | tr '\n' ' ' | sed 's/\. .*/./; s/ *$//')
-  [ -n "$about" ] || about=$(sed -n 's/^name = "\(.*\)"/\1/p' "$scene" | head -1)
+  about=$(about_of "$scene")
   printf '| [%s](scenes/%s.toml) | ![%s](scenes/%s.jpg) | %s | %s frames, %s s, %s MB |\n' "$name" "$name" "$name" "$name" "$about" "$frames" "$seconds" "$megabytes" >> "$rows"
 done
 
@@ -45,6 +50,13 @@ if [ -e "$page" ]; then
     grep -q "^| \[$name\]" "$rows" || printf '%s\n' "$line" >> "$rows"
   done
 fi
+# Those with a picture that were never run have a line, too.
+for picture in samples/scenes/*.jpg; do
+  name=$(basename "$picture" .jpg)
+  scene=samples/scenes/$name.toml
+  [ -e "$scene" ] || continue
+  grep -q "^| \[$name\]" "$rows" || printf '| [%s](scenes/%s.toml) | ![%s](scenes/%s.jpg) | %s | not timed |\n' "$name" "$name" "$name" "$name" "$(about_of "$scene")" >> "$rows"
+done
 {
   echo "# Gallery"
   echo
