@@ -19,6 +19,7 @@
 #include "importers/mesh/import_mesh.h"
 #include "importers/scene/scene_file.h"
 #include "importers/terrain/depressions.h"
+#include "importers/terrain/ground_place.h"
 #include "importers/terrain/import_dem.h"
 #include "importers/terrain/import_terrain.h"
 #include "importers/terrain/spatial_reference.h"
@@ -35,7 +36,23 @@ void add_notes(Lines& lines, const Lines& notes) {
   for (const std::string& note : notes) lines.push_back("note: " + note);
 }
 
-FileFacts describe_grid(const fs::path& file, const ReadLimits& limits) {
+/// "x 751420, y 1157910 (-84.703, 10.4635 in degrees)"
+std::string where(const GroundPlace& place) {
+  std::string text = fmt::format("x {:.10g}, y {:.10g}", std::round(place.map.x() * 10) / 10, std::round(place.map.y() * 10) / 10);
+  if (place.degrees.allFinite()) text += fmt::format(" ({:.7g}, {:.7g} in degrees)", place.degrees.x(), place.degrees.y());
+  return text;
+}
+
+nlohmann::ordered_json values_of(const GroundPlace& place) {
+  using json = nlohmann::ordered_json;
+  return {{"map", {place.map.x(), place.map.y()}},
+          {"degrees", place.degrees.allFinite() ? json({place.degrees.x(), place.degrees.y()}) : json()},
+          {"height_m", place.height},
+          {"slope_deg", place.slope * 180 / kPi},
+          {"downhill_deg", place.downhill * 180 / kPi}};
+}
+
+FileFacts describe_grid(const fs::path& file, const ReadLimits& limits, const std::optional<Vec2>& at) {
   using json = nlohmann::ordered_json;
   DemOptions options;
   options.limits = limits;
@@ -61,11 +78,22 @@ FileFacts describe_grid(const fs::path& file, const ReadLimits& limits) {
                               field.spacing().x(), field.spacing().y(), size.x(), size.y()));
   lines.push_back("format: " + format);
   lines.push_back(fmt::format("covers: x {:.10g} to {:.10g}, y {:.10g} to {:.10g}", corner.x(), corner.x() + size.x(), corner.y(), corner.y() + size.y()));
-  lines.push_back(fmt::format("heights: {:.6g} to {:.6g} m", low, high));
+  const GroundPlace top = highest_place(field, georeference);
+  lines.push_back(fmt::format("heights: {:.6g} to {:.6g} m, highest at {}", low, high, where(top)));
   lines.push_back(holes == 0 ? std::string("holes: none") : fmt::format("holes: {} posts without data ({:.1f} %)", holes, 100 * share));
   lines.push_back("coordinate system: " + to_string(crs));
   lines.push_back(
       fmt::format("local origin: {:.0f}, {:.0f}, {:.0f}", georeference.origin.x(), georeference.origin.y(), georeference.origin.z()));
+
+  std::optional<GroundPlace> place;
+  if (at) {
+    try {
+      place = ground_place(field, georeference, *at);
+    } catch (const InputError& error) {
+      throw InputError(Place{file.string()}, error.faults().front().message);
+    }
+    lines.push_back(fmt::format("at {}: height {:.6g} m, slope {:.0f} deg, downhill is {:.0f} deg counter-clockwise from east", where(*place), place->height, place->slope * 180 / kPi, place->downhill * 180 / kPi));
+  }
 
   json deepest = json::array();
   const std::vector<Depression> depressions = closed_depressions(field);
@@ -77,10 +105,10 @@ FileFacts describe_grid(const fs::path& file, const ReadLimits& limits) {
     lines.push_back(fmt::format("closed depressions: {}, {:.4g} m3", depressions.size(), volume));
     for (std::size_t d = 0; d < std::min<std::size_t>(3, depressions.size()); ++d) {
       const Depression& found = depressions[d];
-      lines.push_back(
-          fmt::format("  {:.6g} m deep, floor {:.6g} m, spills at {:.6g} m, lowest at local {:.6g}, {:.6g}; {} posts, {:.3g} m3",
-                      found.depth(), found.floor, found.spill, found.lowest.x(), found.lowest.y(), found.posts, found.volume));
-      deepest.push_back({{"depth_m", found.depth()}, {"floor_m", found.floor}, {"spill_m", found.spill}, {"lowest_local", {found.lowest.x(), found.lowest.y()}}, {"posts", found.posts}, {"volume_m3", found.volume}});
+      const Vec2 lowest = georeference.origin.head<2>() + found.lowest;
+      lines.push_back(fmt::format("  {:.6g} m deep, floor {:.6g} m, spills at {:.6g} m, lowest at x {:.10g}, y {:.10g}; {} posts, {:.3g} m3", found.depth(), found.floor, found.spill, lowest.x(), lowest.y(), found.posts,
+                                  found.volume));
+      deepest.push_back({{"depth_m", found.depth()}, {"floor_m", found.floor}, {"spill_m", found.spill}, {"lowest_local", {found.lowest.x(), found.lowest.y()}}, {"lowest_map", {lowest.x(), lowest.y()}}, {"posts", found.posts}, {"volume_m3", found.volume}});
     }
   }
   add_notes(lines, import.notes);
@@ -91,6 +119,8 @@ FileFacts describe_grid(const fs::path& file, const ReadLimits& limits) {
   values["spacing_m"] = {field.spacing().x(), field.spacing().y()};
   values["covers"] = {{"west", corner.x()}, {"south", corner.y()}, {"east", corner.x() + size.x()}, {"north", corner.y() + size.y()}};
   values["heights_m"] = {low, high};
+  values["highest"] = values_of(top);
+  if (place) values["at"] = values_of(*place);
   values["holes"] = holes;
   values["hole_share"] = share;
   values["crs"] = {{"title", to_string(crs)}, {"epsg", crs.epsg > 0 ? json(crs.epsg) : json()}, {"wkt", crs.wkt}};
@@ -231,11 +261,15 @@ Lines describe_points(const fs::path& file) {
 
 }  // namespace
 
-FileFacts file_facts(const fs::path& file, const ReadLimits& limits) {
-  if (lower_extension(file) == ".toml") return {describe_scene(file), ""};
-  if (lower_extension(file) == ".bvh") return {describe_skeleton(file), ""};
-  if (lower_extension(file) == ".trc" || lower_extension(file) == ".tsv") return {describe_points(file), ""};
-  return is_dem(file) ? describe_grid(file, limits) : describe_mesh(file, limits);
+FileFacts file_facts(const fs::path& file, const ReadLimits& limits, const std::optional<Vec2>& at) {
+  const std::string extension = lower_extension(file);
+  const bool other = extension == ".toml" || extension == ".bvh" || extension == ".trc" || extension == ".tsv";
+  if (!other && is_dem(file)) return describe_grid(file, limits, at);
+  if (at) throw InputError(Place{file.string()}, "is no terrain grid: of those alone a place can be asked (effuse import makes one of a mesh: --cell 5m)");
+  if (extension == ".toml") return {describe_scene(file), ""};
+  if (extension == ".bvh") return {describe_skeleton(file), ""};
+  if (extension == ".trc" || extension == ".tsv") return {describe_points(file), ""};
+  return describe_mesh(file, limits);
 }
 
 std::vector<std::string> describe_file(const fs::path& file) { return file_facts(file).lines; }

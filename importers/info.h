@@ -1,9 +1,11 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "geometry/base/types.h"
 #include "importers/read_apart.h"
 
 namespace effuse::importers {
@@ -15,14 +17,16 @@ struct FileFacts {
 };
 
 /// The facts of a file:
-///   terrain grids  format, size, spacing, area on the map, heights, holes, coordinate system, origin, closed depressions
+///   terrain grids  format, size, spacing, area on the map, heights and the highest place, holes, coordinate system, origin, closed
+///                  depressions; and at a place, when one is asked for, what ground_place() says of it
 ///   meshes         validate()'s report, pairs of triangles that cut through one another (of up to kMostTested triangles),
 ///                  box, area, volume when it encloses one, attributes, what the file says of up axis, unit and place, or a guess
 ///   scenes (TOML)  name, effects, tables
 ///   clips          joints or markers, frames, travel (.bvh, .trc, .tsv)
 /// and what its reader noted. Throws InputError as the readers do; for a file none of them reads, it
-/// names those that there are. limits: of the readers of meshes and grids.
-FileFacts file_facts(const std::filesystem::path& file, const ReadLimits& limits = {});
+/// names those that there are, and for a place that has no ground, or is asked of anything but a grid. limits: of the readers of
+/// meshes and grids; at: a place of a terrain grid, in its map coordinates or in degrees, east first.
+FileFacts file_facts(const std::filesystem::path& file, const ReadLimits& limits = {}, const std::optional<Vec2>& at = {});
 /// Its lines.
 std::vector<std::string> describe_file(const std::filesystem::path& file);
 

@@ -53,3 +53,4 @@ echo "frames:    $PWD/$out/frames ($(find "$out/frames" -type f | wc -l) files, 
 echo "pictures:  $PWD/$out/preview ($(find "$out/preview" -name 'preview.*.png' | wc -l) of them)"
 echo "at once:   $PWD/$out/preview/contact_sheet.png"
 echo "program:   $PWD/$effuse"
+echo "next:      export PATH=\"$PWD/build/release/samples:\$PATH\"  # then your own mountain: samples/tutorial.md"

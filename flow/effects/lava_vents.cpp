@@ -117,11 +117,12 @@ std::vector<Vent> place_vents(const std::vector<PlannedVent>& vents, const geome
     const auto ground = [&](const Vec2& map) {
       const Vec2 local = map - origin;
       const std::optional<Real> z = terrain.height(local.x(), local.y());
-      if (!z)
-        faults.push_back(
-            {planned.place,
-             fmt::format("the vent at {:.12g}, {:.12g} is not on the terrain, which runs from {:.12g}, {:.12g} to {:.12g}, {:.12g}",
-                         map.x(), map.y(), low.x(), low.y(), high.x(), high.y())});
+      if (!z) {
+        // Small numbers on a map of large ones are likely degrees.
+        const bool degrees = !terrain.georeference().crs.empty() && low.cwiseAbs().maxCoeff() > 1000 && map.cwiseAbs().maxCoeff() <= 180;
+        faults.push_back({planned.place, fmt::format("the vent at {:.12g}, {:.12g} is not on the terrain, which runs from {:.12g}, {:.12g} to {:.12g}, {:.12g}{}", map.x(), map.y(), low.x(), low.y(), high.x(),
+                                                     high.y(), degrees ? fmt::format("; if these are degrees: effuse info TERRAIN --at {:.12g},{:.12g} says where that is in metres", map.x(), map.y()) : "")});
+      }
       return Vec3(local.x(), local.y(), z.value_or(0));
     };
     Vent vent = planned.vent;

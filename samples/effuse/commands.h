@@ -38,11 +38,17 @@ struct CheckCommand {
 };
 ExitCode check(const CheckCommand& command, const CommonOptions& common);
 
-ExitCode info(const std::vector<std::filesystem::path>& files, const CommonOptions& common);
+/// `effuse info`: what files hold.
+struct InfoCommand {
+  std::vector<std::filesystem::path> files;
+  std::vector<double> at;  ///< of terrain grids: what the ground is like at this place, map coordinates or degrees, east first; none: not asked
+};
+ExitCode info(const InfoCommand& command, const CommonOptions& common);
 
-/// `effuse effects`: every key that a scene may have, for people, as JSON, or as the schema of scene files.
+/// `effuse effects`: every key that a scene may have, for people, as JSON, as the schema of scene files, or as a page.
 struct EffectsCommand {
-  bool schema = false;  ///< JSON schema, for editors
+  bool schema = false;    ///< JSON schema, for editors
+  bool markdown = false;  ///< scene_reference()
 };
 ExitCode effects(const EffectsCommand& command, const CommonOptions& common);
 

@@ -1,9 +1,7 @@
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "flow/effects/registry.h"
 #include "samples/effuse/commands.h"
 #include "samples/effuse/scene_keys.h"
 
@@ -14,14 +12,6 @@ namespace {
 using flow::KeyDoc;
 using flow::ParameterDoc;
 using nlohmann::ordered_json;
-
-/// The table of a scene that a key stands in, or is: "lava", "particles"; "" of those beside all tables.
-std::string top_of(const KeyDoc& key) {
-  const ParameterDoc::Kind kind = key.variants.front().kind;
-  const bool table = kind == ParameterDoc::Kind::kTable || kind == ParameterDoc::Kind::kTables;
-  const std::size_t end = key.path.find_first_of(".[");
-  return end == std::string::npos && !table ? "" : key.path.substr(0, end);
-}
 
 void print(const KeyDoc& key) {
   for (const ParameterDoc& doc : key.variants) {
@@ -49,22 +39,16 @@ ExitCode effects(const EffectsCommand& command, const CommonOptions& common) {
     print_document(scene_schema(keys));
     return ExitCode::kDone;
   }
-  struct Part {
-    std::string name, what;
-    bool effect;
-  };
-  // Effects first, then the other tables.
-  std::vector<Part> parts;
-  for (const flow::EffectKind& kind : flow::effect_kinds()) parts.push_back({kind.name, kind.what, true});
-  for (const KeyDoc& key : keys)
-    if (const std::string top = top_of(key); std::none_of(parts.begin(), parts.end(), [&](const Part& part) { return part.name == top; })) parts.push_back({top, top.empty() ? "beside all tables" : key.variants.front().what, false});
+  if (command.markdown) {
+    fmt::print("{}", scene_reference(keys));
+    return ExitCode::kDone;
+  }
   ordered_json all = ordered_json::array();
-  for (const Part& part : parts) {
+  for (const ScenePart& part : scene_parts(keys)) {
     ordered_json entries = ordered_json::array();
     if (!common.json) fmt::print("[{}]  {}\n", part.name, part.what);
     std::string with;
-    for (const KeyDoc& key : keys) {
-      if (top_of(key) != part.name || key.path == part.name || key.path == part.name + "[]") continue;
+    for (const KeyDoc& key : part.keys) {
       if (common.json) {
         entries.push_back(document(key));
         continue;

@@ -53,7 +53,8 @@ void describe_manifest(const json& m, std::vector<std::string>& lines) {
 /// What its report says: how it ended, what it made and what it cost.
 void describe_report(const json& r, std::vector<std::string>& lines) {
   const double seconds = r.at("seconds").get<double>();
-  lines.push_back(fmt::format("{}, {:.0f} s on {} threads, {:.0f} MB of memory, made by effuse {}", r.at("outcome").get<std::string>(), seconds, r.at("threads").get<int>(),
+  const std::string processor = r.contains("processor_seconds") ? fmt::format(" ({:.0f} s of processor time)", r.at("processor_seconds").get<double>()) : "";
+  lines.push_back(fmt::format("{}, {:.0f} s on {} threads{}, {:.0f} MB of memory, made by effuse {}", r.at("outcome").get<std::string>(), seconds, r.at("threads").get<int>(), processor,
                               r.at("peak_memory_bytes").get<double>() / 1e6, r.at("effuse").get<std::string>()));
   for (const auto& [effect, figures] : r.at("effects").items()) {
     std::string line;
@@ -98,8 +99,9 @@ std::vector<std::string> describe_run(const fs::path& folder) {
   return lines;
 }
 
-importers::FileFacts describe(const fs::path& file, const importers::ReadLimits& limits) {
+importers::FileFacts describe(const fs::path& file, const importers::ReadLimits& limits, const std::optional<Vec2>& at) {
   std::error_code ignored;  // a link to itself, a name too long: the reader says so
+  if (at) return importers::file_facts(file, limits, at);
   if (const std::optional<fs::path> run = run_of(file)) return {describe_run(*run), ""};
   if (fs::is_directory(file, ignored)) throw InputError(Place{file.string()}, "is a folder that holds no run (no manifest.json), wanted a file or the folder of a run");
   if (file.extension() == ".vdb") return {skin::describe_vdb(file), ""};
@@ -107,13 +109,15 @@ importers::FileFacts describe(const fs::path& file, const importers::ReadLimits&
 }
 }  // namespace
 
-ExitCode info(const std::vector<fs::path>& files, const CommonOptions& common) {
+ExitCode info(const InfoCommand& command, const CommonOptions& common) {
   nlohmann::ordered_json j = nlohmann::ordered_json::array();
   std::vector<Fault> faults;
   const importers::ReadLimits limits = read_limits(common);
-  for (const fs::path& file : files) {
+  std::optional<Vec2> at;
+  if (!command.at.empty()) at = Vec2(command.at[0], command.at[1]);
+  for (const fs::path& file : command.files) {
     try {
-      const importers::FileFacts facts = describe(file, limits);
+      const importers::FileFacts facts = describe(file, limits, at);
       const std::vector<std::string>& lines = facts.lines;
       j.push_back({{"file", file.string()}, {"facts", lines}});
       if (!facts.values.empty()) j.back()["values"] = nlohmann::ordered_json::parse(facts.values);

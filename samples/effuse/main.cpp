@@ -208,9 +208,10 @@ int main(int argc, char** argv) {
   check_verb->add_option("scene", check.scene, "scene file (TOML)")->required();
   add_set(check_verb, check.set);
 
-  std::vector<std::filesystem::path> files;
+  effuse::InfoCommand info;
   CLI::App* info_verb = add_common(app.add_subcommand("info", "facts of files: terrain, meshes, volumes, scenes, runs (their folder, or run.json in it)"));
-  info_verb->add_option("file", files, "files")->required();
+  info_verb->add_option("file", info.files, "files")->required();
+  info_verb->add_option("--at", info.at, "X,Y of a terrain grid, in its map coordinates, or degrees as web maps give them, east first: where that is for a scene, how high and steep, and which way it falls")->expected(2)->delimiter(',');
 
   effuse::ImportCommand import;
   CLI::App* import_verb = add_common(app.add_subcommand("import", "terrain and meshes as other programs want them: reprojected, cropped, resampled, filled, repaired, simplified; grids as meshes to a stated error, meshes as grids"));
@@ -219,6 +220,7 @@ int main(int argc, char** argv) {
   effuse::EffectsCommand effects;
   CLI::App* effects_verb = add_common(app.add_subcommand("effects", "the effects there are, and every key of a scene"));
   effects_verb->add_flag("--schema", effects.schema, "print a JSON schema of scene files (draft 2020-12), for editors");
+  effects_verb->add_flag("--markdown", effects.markdown, "print the same as a page (samples/scene-reference.md)")->excludes("--schema");
 
   effuse::SkinCommand skin;
   CLI::App* skin_verb = add_common(app.add_subcommand("skin", "the surface of any program's particles as a mesh: PLY, VTK, VTP, VTU, BGEO, XYZ, CSV in, PLY, OBJ, GLB, VDB out"));
@@ -290,7 +292,7 @@ int main(int argc, char** argv) {
     if (*run_verb) return flushed(effuse::run(run, common));
     if (*render_verb) return flushed(effuse::render_run(render, common));
     if (*check_verb) return flushed(effuse::check(check, common));
-    if (*info_verb) return flushed(effuse::info(files, common));
+    if (*info_verb) return flushed(effuse::info(info, common));
     if (*import_verb) return flushed(effuse::import_terrain_file(import, common));
     if (*effects_verb) return flushed(effuse::effects(effects, common));
     if (*skin_verb) return flushed(effuse::skin_particles(skin, common));

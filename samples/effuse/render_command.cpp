@@ -15,7 +15,7 @@
 #include "importers/scene/scene_file.h"
 #include "samples/effuse/commands.h"
 #include "samples/effuse/progress.h"
-#include "samples/effuse/run_frames.h"
+#include "samples/effuse/run_folder.h"
 #include "samples/effuse/solid_things.h"
 #include "skin/scene/skin_settings.h"
 #include "skin/write/exr.h"
@@ -47,11 +47,36 @@ Range frames_wanted(const std::string& text, int count) {
   return range;
 }
 
+/// Takes the ways to place a camera that the changes replace out of [preview]: keys, round the terrain or a circle of it, round a target.
+void drop_replaced_camera(flow::Node& scene, const std::vector<std::string>& set) {
+  const auto sets = [&](const std::string& key) {
+    return std::any_of(set.begin(), set.end(), [&](const std::string& assignment) {
+      const std::string name = "preview." + key;
+      return assignment.starts_with(name) && assignment.size() > name.size() && (assignment[name.size()] == '=' || assignment[name.size()] == '[');
+    });
+  };
+  std::vector<std::string> replaced;
+  if (sets("key")) replaced = {"azimuth", "elevation", "turn", "motion", "view", "target", "distance"};
+  else if (sets("azimuth") || sets("elevation") || sets("turn") || sets("view") || sets("target") || sets("distance")) replaced = {"key"};
+  if (sets("view")) replaced.insert(replaced.end(), {"target", "distance"});
+  else if (sets("target") || sets("distance")) replaced.emplace_back("view");
+  for (auto& [name, preview] : scene.entries) {
+    if (name != "preview") continue;
+    for (std::size_t k = preview.entries.size(); k-- > 0;) {
+      const std::string& key = preview.entries[k].first;
+      if (sets(key) || std::find(replaced.begin(), replaced.end(), key) == replaced.end()) continue;
+      preview.entries.erase(preview.entries.begin() + static_cast<std::ptrdiff_t>(k));
+      preview.key_places.erase(preview.key_places.begin() + static_cast<std::ptrdiff_t>(k));
+    }
+  }
+}
+
 /// [preview] of the run's scene with the changes; the rest of the scene is read, so that a misspelt key is told, and not used.
 skin::SkinSettings settings_of(const fs::path& scene, const std::vector<std::string>& set) {
   for (const std::string& assignment : set)
     if (!assignment.starts_with("preview.")) throw InputError(Place{"--set"}, fmt::format("'{}': only [preview] can change in pictures of what has been simulated (preview.azimuth=2)", assignment));
   flow::Node node = importers::read_scene_file(scene);
+  drop_replaced_camera(node, set);
   for (const std::string& assignment : set) importers::apply_override(node, assignment);
   flow::Parameters root(node);
   static_cast<void>(flow::read_scene(root, flow::effect_kinds()));
@@ -93,11 +118,10 @@ ExitCode render_run(const RenderCommand& command, const CommonOptions& common) {
   const auto wants = [&](const char* kind) { return std::find(command.to.begin(), command.to.end(), kind) != command.to.end(); };
   const bool films = wants("mp4") || wants("gif");
   if (films && command.every != 1) throw InputError(Place{"--every"}, "films need every frame: without --every, or with fewer --frames");
-  RunFrames run(command.run);
+  const RunFolder run(command.run);
   const skin::SkinSettings settings = settings_of(command.run / "scene.toml", command.set);
-  const Range range = frames_wanted(command.frames, run.count());
-  if (range.last < range.first) throw InputError(Place{command.run.string()}, "has no frame yet");
-  const geometry::Terrain terrain = run.terrain();
+  const Range range = frames_wanted(command.frames, run.frames());
+  const geometry::Terrain terrain = run.ground();
   skin::check_camera(settings, terrain, range.last, run.fps());
 
   const fs::path folder = command.folder.empty() ? command.run / "render" : command.folder;
@@ -116,7 +140,7 @@ ExitCode render_run(const RenderCommand& command, const CommonOptions& common) {
   int made = 0;
   Progress progress(range.first - 1, range.last, common.quiet);
   for (int frame = range.first; frame <= range.last; frame += command.every, ++made) {
-    RunFrames::Shown shown = run.frame(frame);
+    RunFolder::Shown shown = run.shown(frame);
     const skin::Image image = preview.render(in_one_picture(std::move(shown.lava), shown.others), skin::picture_at(settings, terrain, frame / run.fps()), shown.air);
     if (pngs) skin::write_png(folder / fmt::format("render.{:04}.png", frame), image);
     if (wants("exr")) skin::write_exr(folder / fmt::format("render.{:04}.exr", frame), image);

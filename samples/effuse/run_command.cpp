@@ -38,10 +38,19 @@ namespace {
 
 constexpr double kUnsolvedShare = 0.05;  // of the steps: more are worth a word
 
+/// Processor time of all threads since the process began [s], user and system.
+double processor_seconds() {
+  rusage usage{};
+  ::getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& t) { return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec); };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
 /// What run.json says: figures of the frames made, by this call and the ones it resumed.
 class RunRecord {
  public:
-  RunRecord(const LoadedScene& loaded, fs::path folder) : loaded_(loaded), folder_(std::move(folder)) {
+  /// The call's processor time counts from processor_start on [s], a value of processor_seconds().
+  RunRecord(const LoadedScene& loaded, fs::path folder, double processor_start) : loaded_(loaded), folder_(std::move(folder)), processor_start_(processor_start) {
     if (!loaded.forecast) return;
     const budget::Machine machine = budget::known_machine(machine_);
     cost_ = cost_of(loaded, machine);
@@ -55,6 +64,7 @@ class RunRecord {
       for (const ordered_json& frame : old.at("frames"))
         if (frame.at("frame").get<int>() <= last) frames_.push_back(frame);
       earlier_s_ = old.at("seconds").get<double>();
+      earlier_cpu_s_ = old.value("processor_seconds", 0.0);
       if (old.contains("accuracy")) {
         const ordered_json& came = old.at("accuracy").at("came_to");
         earlier_steps_s_ = came.at("seconds").get<double>();
@@ -101,6 +111,7 @@ class RunRecord {
     j["seed"] = loaded_.scene.seed;
     j["threads"] = thread_count();
     j["seconds"] = earlier_s_ + profile.elapsed_s();
+    j["processor_seconds"] = earlier_cpu_s_ + processor_seconds() - processor_start_;
     rusage usage{};
     ::getrusage(RUSAGE_SELF, &usage);
     j["peak_memory_bytes"] = static_cast<std::int64_t>(usage.ru_maxrss) * 1024;
@@ -128,9 +139,8 @@ class RunRecord {
     CameTo c = came_to(loaded_, folder_);
     rusage usage{};
     ::getrusage(RUSAGE_SELF, &usage);
-    const auto seconds = [](const timeval& t) { return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec); };
     c.seconds = earlier_steps_s_ + profile.elapsed_s() - loaded_.rehearsal_seconds;
-    c.processor_seconds = earlier_processor_s_ + seconds(usage.ru_utime) + seconds(usage.ru_stime) - loaded_.rehearsal_processor_seconds;
+    c.processor_seconds = earlier_processor_s_ + processor_seconds() - loaded_.rehearsal_processor_seconds;
     c.memory = 1024.0 * static_cast<double>(usage.ru_maxrss);
     return c;
   }
@@ -141,10 +151,11 @@ class RunRecord {
  private:
   const LoadedScene& loaded_;
   fs::path folder_;
+  double processor_start_;
   ordered_json frames_ = ordered_json::array();
   ordered_json branches_ = ordered_json::array();
   ordered_json skin_;  // of the last frame with one
-  double earlier_s_ = 0, earlier_steps_s_ = 0, earlier_processor_s_ = 0;  // the last two without rehearsals
+  double earlier_s_ = 0, earlier_cpu_s_ = 0, earlier_steps_s_ = 0, earlier_processor_s_ = 0;  // the last two without rehearsals
   Cost cost_;            // predicted, where the scene says how right it is to be
   std::string machine_;  // where the figures for it come from
 };
@@ -168,10 +179,13 @@ std::string resume_line(const RunCommand& command, const std::string& program, c
   return line + " --resume";
 }
 
-/// "4 min 4 s: sph.forces 61 %, preview.rays 12 %, skin.mesh 8 %"
-std::string summary(const Profile& profile) {
+/// "4.2 s", "4 min 4 s"
+std::string duration(double s) { return s < 120 ? fmt::format("{:.1f} s", s) : fmt::format("{:.0f} min {:.0f} s", std::floor(s / 60), std::floor(s - 60 * std::floor(s / 60))); }
+
+/// "4 min 4 s, 7 min 3 s of processor time: sph.forces 61 %, preview.rays 12 %, skin.mesh 8 %"
+std::string summary(const Profile& profile, double processor_s) {
   const double all = profile.elapsed_s();
-  std::string text = all < 120 ? fmt::format("{:.1f} s", all) : fmt::format("{:.0f} min {:.0f} s", std::floor(all / 60), std::floor(all - 60 * std::floor(all / 60)));
+  std::string text = fmt::format("{}, {} of processor time", duration(all), duration(processor_s));
   const std::vector<ZoneRow> zones = profile.zones();
   for (std::size_t k = 0; k < std::min<std::size_t>(zones.size(), 3); ++k) text += fmt::format("{} {} {:.0f} %", k == 0 ? ":" : ",", zones[k].name, 100 * zones[k].self_s / all);
   return text;
@@ -220,6 +234,7 @@ void branch(const fs::path& folder, int last, LoadedScene& loaded, FlowWriter& f
 
 ExitCode run(const RunCommand& command, const CommonOptions& common) {
   Profile profile;
+  const double processor_start = processor_seconds();
   const ProfileScope scope(profile);
   const std::unique_ptr<LoadedScene> loaded = load_scene(command.scene, command.set, command.frames, read_limits(common));
   const flow::Scene& scene = loaded->scene;
@@ -244,7 +259,7 @@ ExitCode run(const RunCommand& command, const CommonOptions& common) {
   FlowWriter flow_writer(*loaded, folder);
   BodyWriter body_writer(*loaded, folder);
   const OutputFolder held(folder);
-  RunRecord record(*loaded, folder);
+  RunRecord record(*loaded, folder, processor_start);
   if (command.resume) {
     if (go_on(folder, *loaded, flow_writer, body_writer)) {
       record.read(simulation.frame());
@@ -356,7 +371,7 @@ ExitCode run(const RunCommand& command, const CommonOptions& common) {
   const ordered_json document = record.document(simulation, profile, outcome);
   record.write(document);
   if (!common.quiet && !common.json) {
-    const std::string text = command.stats ? "\n" + profile.table() + "\n" : fmt::format("took {} (--stats lists all)\n", summary(profile));
+    const std::string text = command.stats ? "\n" + profile.table() + "\n" : fmt::format("took {} (--stats lists all)\n", summary(profile, processor_seconds() - processor_start));
     std::fwrite(text.data(), 1, text.size(), stderr);
   }
   if (loaded->forecast && code == ExitCode::kDone) log_info(beside(*loaded->forecast, record.cost(), record.outcome_of(profile)));
@@ -376,7 +391,8 @@ ExitCode run(const RunCommand& command, const CommonOptions& common) {
   if (code == ExitCode::kUnstable) {
     log_warning(fmt::format("stopped in frame {}; the last good state is {}", simulation.frame() + 1, flow::checkpoints(folder).front().string()));
   }
-  if (code == ExitCode::kDone) log_info(fmt::format("{} frames in {}", simulation.frame(), (folder / "frames").string()));
+  if (code == ExitCode::kDone)
+    log_info(fmt::format("{} frames in {}; to see them: {} view {}, or blender --python {}", simulation.frame(), (folder / "frames").string(), quoted(common.program), quoted(folder.string()), quoted((folder / "open_in_blender.py").string())));
   signals.reset();  // a reader of the document that went away ends this as it does any tool
   if (common.json) print_document(document.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   return code;

@@ -1,6 +1,7 @@
 #include "samples/effuse/run_folder.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -11,10 +12,14 @@
 
 #include "geometry/base/error.h"
 #include "geometry/base/files.h"
+#include "geometry/base/zones.h"
 #include "geometry/mesh/measure.h"
 #include "importers/input_file.h"
 #include "importers/mesh/import_mesh.h"
 #include "importers/mesh/ply_reader.h"
+#include "importers/points/import_points.h"
+#include "samples/effuse/air_look.h"
+#include "skin/write/read_volume.h"
 
 namespace effuse {
 
@@ -30,8 +35,7 @@ bool there(const fs::path& path) {
 }
 
 /// As it stands in the file: vertices that a crease parts stay apart.
-TriMesh read_ply_mesh(const fs::path& file) {
-  importers::PlyMesh ply = importers::parse_ply(read_file(file), file.string());
+TriMesh mesh_of(importers::PlyMesh ply) {
   TriMesh mesh;
   mesh.positions = std::move(ply.positions);
   mesh.normals = std::move(ply.normals);
@@ -41,6 +45,8 @@ TriMesh read_ply_mesh(const fs::path& file) {
       mesh.triangles.push_back({ply.corners[ply.face_start[face]], ply.corners[corner - 1], ply.corners[corner]});
   return mesh;
 }
+
+TriMesh read_ply_mesh(const fs::path& file) { return mesh_of(importers::parse_ply(read_file(file), file.string())); }
 
 TriMesh read_mesh(const fs::path& file) {
   return importers::lower_extension(file) == ".ply" ? read_ply_mesh(file) : importers::import_mesh(file).mesh;
@@ -60,6 +66,18 @@ void append(TriMesh& all, TriMesh more) {
   colors.width = 3;
   if (color != more.attributes.end() && color->second.width == 3) colors.values.insert(colors.values.end(), color->second.values.begin(), color->second.values.end());
   else colors.values.insert(colors.values.end(), 3 * n, 0.25f);
+}
+
+/// "comment key: value" lines of a PLY header.
+skin::Metadata comments_of(std::string_view bytes) {
+  skin::Metadata all;
+  const std::string_view header = bytes.substr(0, bytes.find("end_header"));
+  constexpr std::string_view kHead = "\ncomment ";
+  for (std::size_t at = header.find(kHead); at != std::string_view::npos; at = header.find(kHead, at + 1)) {
+    const std::string_view line = header.substr(at + kHead.size(), header.find('\n', at + 1) - at - kHead.size());
+    if (const std::size_t colon = line.find(": "); colon != std::string_view::npos) all.emplace_back(line.substr(0, colon), line.substr(colon + 2));
+  }
+  return all;
 }
 
 /// The fields of a line of CSV without quotes.
@@ -112,6 +130,7 @@ RunFolder::RunFolder(fs::path folder) : folder_(std::move(folder)) {
     for (const char* ending : {"ply", "glb", "obj"})
       if (files.contains(ending)) skins_.emplace_back(ending);
     for (const auto& [key, pattern] : files.items()) {
+      patterns_[key] = pattern.get<std::string>();
       if (key == "ply" || key == "glb" || key == "obj" || key == "vdb" || key == "preview" || !pattern.get<std::string>().ends_with(".####.ply")) continue;
       layers_.push_back(key);
     }
@@ -164,6 +183,53 @@ TriMesh RunFolder::others(int frame) const {
   for (const std::string& layer : layers_)
     if (const fs::path file = frame_file(layer, frame, "ply"); there(file)) append(all, read_ply_mesh(file));
   return all;
+}
+
+geometry::Terrain RunFolder::ground() const {
+  TriMesh mesh = terrain();
+  if (mesh.triangles.empty()) throw InputError(Place{(folder_ / "terrain.ply").string()}, "is missing or empty: there is no ground to draw");
+  return geometry::Terrain::from_mesh(std::move(mesh), {origin_, crs_});
+}
+
+RunFolder::Shown RunFolder::shown(int frame) const {
+  ZONE("read.frame");
+  Shown shown;
+  if (!skins_.empty() && skins_.front() != "ply")
+    throw InputError(Place{folder_.string()}, fmt::format("has its skins as {} alone, and pictures are made of PLY: wanted a run with that among its output.formats", fmt::join(skins_, ", ")));
+  if (!skins_.empty()) shown.lava = read_ply_mesh(frame_file("skin", frame, "ply"));
+  if (still_obstacles_) shown.others = read_ply_mesh(folder_ / "obstacles.ply");
+  for (const auto& [name, pattern] : patterns_) {
+    const std::size_t number = pattern.find("####");
+    // The skin is there already.
+    if (!pattern.starts_with("frames/") || number == std::string::npos || name == "ply" || name == "vdb") continue;
+    const fs::path file = folder_ / (pattern.substr(0, number) + fmt::format("{:04}", frame) + pattern.substr(number + 4));
+    if (name != "obstacles" && !there(file)) continue;
+    if (pattern.ends_with(".ply")) {
+      const std::string bytes = read_file(file);
+      importers::PlyMesh ply = importers::parse_ply(bytes, file.string());
+      if (ply.face_start.size() > 1) {
+        append_to_picture(shown.others, mesh_of(std::move(ply)));
+      } else if (!ply.positions.empty()) {
+        flow::NamedCloud cloud;
+        if (!take_look(comments_of(bytes), cloud)) {
+          if (std::find(left_out_.begin(), left_out_.end(), name) == left_out_.end()) left_out_.push_back(name);
+          continue;
+        }
+        const importers::PointCloud points = importers::parse_points(bytes, file.string());
+        cloud.x = points.position;
+        cloud.v = points.velocity.empty() ? std::vector<Vec3>(points.size(), Vec3::Zero()) : points.velocity;
+        cloud.radius = points.radius.empty() ? std::vector<Real>(points.size(), 0.01) : points.radius;
+        cloud.temperature = points.temperature.empty() ? std::vector<Real>(points.size(), 0) : points.temperature;
+        cloud.opacity.assign(points.size(), 1);
+        add_cloud(shown.air, cloud, kShutter * time_scale_ / fps_);
+      }
+    } else if (pattern.ends_with(".vdb")) {
+      skin::Metadata about;
+      geometry::GridVolume volume = skin::read_volume_vdb(file, &about);
+      if (const auto color = color_of(about)) add_volume(shown.air, std::move(volume), *color);
+    }
+  }
+  return shown;
 }
 
 void RunFolder::read_series(std::vector<Real>& times, std::vector<skin::PageSeries>& series) const {

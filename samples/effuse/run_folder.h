@@ -1,16 +1,20 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "geometry/mesh/tri_mesh.h"
+#include "geometry/terrain/terrain.h"
 #include "skin/page/page.h"
+#include "skin/preview/preview.h"
 
 namespace effuse {
 
-/// A run's folder as `effuse run` leaves it, read back: manifest.json, the frames' meshes, flow.csv.
+/// A run's folder as `effuse run` leaves it, read back for its page and for pictures of it: manifest.json, the frames' meshes, points and
+/// volumes, flow.csv.
 class RunFolder {
  public:
   /// Reads manifest.json. Throws InputError when the folder holds no run, or its manifest is damaged.
@@ -33,6 +37,19 @@ class RunFolder {
   std::optional<geometry::TriMesh> lava(int frame) const;
   /// All that is solid and not lava, as one mesh with "color": obstacles, bodies, plants, ...; files that are missing are left out.
   geometry::TriMesh others(int frame) const;
+  /// The terrain as ground on its map. Throws InputError when it is missing or broken.
+  geometry::Terrain ground() const;
+  /// What a picture of the frame shows: skin, obstacles, other surfaces; grains, sparks and smoke. Throws InputError for a file that is
+  /// missing or broken, and for a run whose skins are not PLY, which alone holds their colours as pictures want them. An effect's own files
+  /// come when it has something to show, and may be absent.
+  struct Shown {
+    geometry::TriMesh lava, others;
+    skin::Air air;
+  };
+  Shown shown(int frame) const;
+  /// Names of what flies and is not in the files as it looks: puffs and flames. Of the frames shown so far.
+  const std::vector<std::string>& left_out() const { return left_out_; }
+
   /// flow.csv as curves with the times of its lines; both empty when it is not there. Throws InputError when it is damaged.
   void read_series(std::vector<Real>& times, std::vector<skin::PageSeries>& series) const;
 
@@ -47,7 +64,9 @@ class RunFolder {
   std::vector<std::string> skins_;          // endings: "ply", "glb", "obj"
   std::vector<std::string> layers_;         // of meshes, PLY: "obstacles", "jello", ...
   std::vector<std::string> point_layers_;
+  std::map<std::string, std::string> patterns_;  // frames/NAME.####.ext by the manifest's names
   bool still_obstacles_ = false;
+  mutable std::vector<std::string> left_out_;
 };
 
 }  // namespace effuse

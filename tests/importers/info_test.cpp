@@ -25,13 +25,23 @@ TEST(DescribeFile, AVolcanoIsAGridWithOneDeepCrater) {
   EXPECT_TRUE(contains(text, "holes: none")) << text;
   EXPECT_TRUE(contains(text, "New Zealand Map Grid (EPSG:27200)")) << text;
   EXPECT_TRUE(contains(text, "local origin: 2667405, 6478705, 0")) << text;
-  EXPECT_TRUE(contains(text, "20 m deep, floor 148 m, spills at 168 m")) << text;
+  EXPECT_TRUE(contains(text, "highest at x ")) << text;
+  EXPECT_TRUE(contains(text, "20 m deep, floor 148 m, spills at 168 m, lowest at x 2667")) << text;
 }
 
 TEST(DescribeFile, AGridTellsTheSameToPrograms) {
   const std::string values = file_facts(EFFUSE_SOURCE_DIR "/samples/scenes/maunga-whau.asc").values;
   for (const char* part : {"\"posts\":[61,87]", "\"spacing_m\":[10.0,10.0]", "\"heights_m\":[94.0,195.0]", "\"hole_share\":0.0", "\"epsg\":27200", "\"west\":2667405.0", "\"depth_m\":20.0", "ESRI ASCII grid"})
     EXPECT_TRUE(contains(values, part)) << part << " in " << values;
+}
+
+TEST(DescribeFile, AGridTellsOfAPlaceWhatASceneWantsAndOthersRefuse) {
+  const FileFacts facts = file_facts(EFFUSE_SOURCE_DIR "/samples/scenes/maunga-whau.asc", {}, Vec2(2667617, 6479412));
+  std::string text;
+  for (const std::string& line : facts.lines) text += line + "\n";
+  EXPECT_TRUE(contains(text, "at x 2667617, y 6479412 (174.76")) << text;
+  EXPECT_TRUE(contains(facts.values, "\"downhill_deg\"")) << facts.values;
+  EXPECT_THROW(file_facts(EFFUSE_SOURCE_DIR "/samples/scenes/house.obj", {}, Vec2(1, 2)), InputError);
 }
 
 TEST(DescribeFile, AMeshTellsVolumeOnlyWhenItEnclosesOne) {

@@ -218,10 +218,24 @@ TEST_F(ProgramTest, TheReadmesCameraIsOneOfTheMountain) {
   EXPECT_EQ(outcome.code, 0) << outcome.err;
 }
 
+TEST_F(ProgramTest, AVentInDegreesIsToldHowTheyBecomeMetresOfTheMap) {
+  const Outcome checked = effuse({"check", kScenes / "maunga-whau-modern.toml", "--set", "lava.vent=[{at=[174.764, -36.876], width=5, rate=5}]"});
+  EXPECT_EQ(checked.code, 2);
+  EXPECT_NE(checked.err.find("effuse info TERRAIN --at 174.764,-36.876"), std::string::npos) << checked.err;
+  const Outcome place = effuse({"info", kScenes / "maunga-whau.asc", "--at", "174.764,-36.876", "--json"});
+  ASSERT_EQ(place.code, 0) << place.err;
+  const nlohmann::json at = nlohmann::json::parse(place.out).at(0).at("values").at("at");
+  EXPECT_NEAR(at.at("degrees").at(0).get<double>(), 174.764, 1e-7);
+  const Outcome metres = effuse({"check", kScenes / "maunga-whau-modern.toml", "--set", fmt::format("lava.vent=[{{at=[{}, {}], width=5, rate=5}}]", at.at("map").at(0).get<double>(), at.at("map").at(1).get<double>())});
+  EXPECT_EQ(metres.code, 0) << metres.err;
+}
+
 TEST_F(ProgramTest, SaysWhereTheTimeWentInALineAndAllOfItWhenAsked) {
   const Outcome brief = effuse(run_gully(folder_ / "out", 2));
   ASSERT_EQ(brief.code, 0) << brief.err;
   EXPECT_EQ(count(brief.err, "took "), 1u) << brief.err;
+  EXPECT_EQ(count(brief.err, " of processor time: "), 1u) << brief.err;
+  EXPECT_GT(run_json(folder_ / "out").at("processor_seconds").get<double>(), 0.01);
   EXPECT_EQ(count(brief.err, " %"), 3u) << "three parts\n" << brief.err;
   EXPECT_LE(count(brief.err, "\n"), 4u) << "two frames, that line, and where they are\n" << brief.err;
   const Outcome all = effuse(run_gully(folder_ / "out", 2, {"--force", "--stats"}));

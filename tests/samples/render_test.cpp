@@ -61,6 +61,10 @@ TEST_F(Render, ByTheSameCameraIsTheRunsOwnPictureAndByAnotherIsNot) {
   ASSERT_EQ(other.code, 0) << other.err;
   EXPECT_FALSE(fs::exists(folder_ / "other/render.0001.png"));
   EXPECT_GT(apart(run() / "preview/preview.0003.png", folder_ / "other/render.0003.png"), 5);
+  // A way of placing the camera replaces the scene's, which the run's scene.toml has in full: here keys, a fly-along.
+  const Outcome along = effuse(fmt::format("render '{}' -o '{}' --frames 2 --set 'preview.key=[{{time=0, position=[30, 10, 6], target=[18, 46, 0]}}, {{time=2, position=[8, 20, 4]}}]'", run().string(), (folder_ / "along").string()));
+  ASSERT_EQ(along.code, 0) << along.err;
+  EXPECT_GT(apart(run() / "preview/preview.0002.png", folder_ / "along/render.0002.png"), 5);
   EXPECT_EQ(read_file(folder_ / "other/render.0002.exr").substr(0, 4), "\x76\x2f\x31\x01");
 }
 

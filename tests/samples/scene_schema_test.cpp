@@ -69,6 +69,10 @@ class SceneSchema : public testing::Test {
   }
 };
 
+TEST_F(SceneSchema, TheReferenceInTheRepositoryIsWhatTheProgramPrints) {
+  EXPECT_TRUE(read_file(fs::path(EFFUSE_SOURCE_DIR) / "samples" / "scene-reference.md") == scene_reference(keys())) << "effuse effects --markdown > samples/scene-reference.md";
+}
+
 TEST_F(SceneSchema, IsASchema) {
   EXPECT_EQ(fmt::format("{}", fmt::join(faults_of_schema(schema()), "\n")), "");
   EXPECT_EQ(schema().at("$schema"), "https://json-schema.org/draft/2020-12/schema");
