@@ -165,11 +165,6 @@ async function main() {
     // Of all the browser's processes, on this machine's cores, whatever else they do: the wall's clock alone says little on a busy one.
     seen.scrub.processor_s_a_frame = ((await busy()) - before_scrub) / (2 * seen.frames);
 
-    // And what of it unpacking the frames takes, each once, which is the page's own work; the rest is drawing.
-    const before_unpacking = await busy();
-    await browser.value(`(async () => { for (const frame of effuse.page.frames) if (frame.lava !== null) await loadMesh(frame.lava, effuse.frames.meshes[frame.lava]); })()`);
-    seen.scrub.unpack_s_a_frame = ((await busy()) - before_unpacking) / seen.frames;
-
     // With the mouse, along the slider.
     const slider = await browser.value(`(() => { const r = document.getElementById("scrub").getBoundingClientRect(); return { x: r.left, y: r.top + r.height / 2, w: r.width }; })()`);
     const mouse = (type, x, y, more = {}) => browser.send("Input.dispatchMouseEvent", { type, x, y, button: "left", buttons: 1, clickCount: 1, ...more });
