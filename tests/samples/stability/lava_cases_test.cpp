@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <limits>
 
@@ -13,6 +14,7 @@ using flow::sph::ClassicLava;
 using flow::sph::ClassicOptions;
 using flow::sph::ModernLava;
 using flow::sph::ModernOptions;
+using flow::sph::SurfaceLaw;
 using study::block;
 using study::plane;
 
@@ -322,6 +324,37 @@ std::string cold_ground(bool guarded) {
   return run_lava("hot-onto-ice", lava, 2, 0.05, b);
 }
 
+std::string into_water(bool guarded) {
+  // Hot lava falls through water's surface, which takes 50 times what air does, onto wet ground.
+  ModernOptions o = fluid(500);
+  o.heat.on = true;
+  o.heat.conductivity = 1e4;
+  o.heat.longest_interval = 0;
+  o.heat.air.air_temperature = 300;
+  o.ground_temperature = 288;
+  o.heat.guards.monotone_conduction = guarded;
+  ModernLava lava(o, {}, {plane(Vec3::UnitZ(), Vec3::Zero(), Vec3::Zero(), 288)});
+  constexpr Real kLevel = 0.25;
+  SurfaceLaw water;
+  water.air_temperature = 288;
+  water.convection = 1e5;
+  lava.set_water({[](std::span<const Vec3> x, std::span<std::uint8_t> wet) {
+                    for (std::size_t i = 0; i < x.size(); ++i) wet[i] = x[i].z() < kLevel;
+                  },
+                  water});
+  const std::vector<Vec3> x = block(Vec3(0, 0, kLevel), {6, 6, 6}, kDx);
+  std::vector<Real> T;
+  for (std::size_t i = 0; i < x.size(); ++i) T.push_back(i % 2 == 0 ? 1500 : 1200);
+  lava.add(x, std::vector<Vec3>(x.size(), Vec3::Zero()), T);
+  LavaBounds b = on_floor(1.3 * std::sqrt(2 * kGravity * (kLevel + 0.7)));
+  b.coldest = 288 - 1e-6;
+  b.hottest = 1500 + 1;  // viscous heating
+  const std::string broken = run_lava("hot-onto-water", lava, 2, 0.05, b);
+  if (!broken.empty()) return broken;
+  const Real coldest = *std::min_element(lava.temperatures().begin(), lava.temperatures().end());
+  return coldest < 1000 ? "" : fmt::format("water has not cooled it: {:.4g} K at least", coldest);
+}
+
 std::string stiff_classic(bool guarded) {
   ClassicOptions o;
   o.spacing = kDx;
@@ -377,6 +410,7 @@ std::vector<HardCase> lava_cases() {
       {"conductivity-1e6", "monotone conduction", [](bool guarded) { return heat("conductivity-1e6", 1e6, 150, 200, guarded); }},
       {"latent-heat-over-0.1-K", "monotone conduction", [](bool guarded) { return heat("latent-heat-over-0.1-K", 1e3, 0.1, 250, guarded); }},
       {"hot-onto-ice", "monotone conduction", cold_ground},
+      {"hot-onto-water", "monotone conduction", into_water},
   };
 }
 
