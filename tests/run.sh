@@ -27,5 +27,6 @@ if [ "$what" = all ]; then
 fi
 
 [ ! -f tests/tsan.supp ] || export TSAN_OPTIONS="suppressions=$PWD/tests/tsan.supp ${TSAN_OPTIONS:-}"
+[ ! -f tests/lsan.supp ] || export LSAN_OPTIONS="suppressions=$PWD/tests/lsan.supp:print_suppressions=0 ${LSAN_OPTIONS:-}"
 # The last lines are ctest's own.
 exec ctest --test-dir "build/$preset" --output-on-failure --no-tests=error -j "$jobs" -LE bench $select

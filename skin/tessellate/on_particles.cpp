@@ -15,7 +15,7 @@ namespace effuse::skin {
 namespace {
 
 constexpr Real kLeastAngle = 0.1;   // sine of the angle between two planes that have a line in common
-constexpr Real kThinnest = 8;       // [deg]
+constexpr Real kThinnest = 11;      // [deg]
 constexpr int kRounds = 3;          // in which triangles beside those whose corners stayed are looked at
 constexpr Real kElsewhere = 0.2;    // [spacings]
 constexpr Real kLeastSlant = 0.55;  // cosine between a line and the normal

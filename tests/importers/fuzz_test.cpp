@@ -137,7 +137,7 @@ void fuzz(std::uint64_t seed, int times) {
   }
 }
 
-TEST(Fuzz, HundredsOfSmallChangesAreReadOrRefused) { fuzz(1, 100); }
+TEST(FuzzSlow, HundredsOfSmallChangesAreReadOrRefused) { fuzz(1, 100); }
 
 TEST(FuzzSlow, ThousandsOfSmallChangesAreReadOrRefused) {
   for (std::uint64_t seed = 2; seed < 6; ++seed) fuzz(seed, 1000);

@@ -70,7 +70,9 @@ Words with(Words words, const Words& more) {
   return words;
 }
 
-TEST_F(Branch, KeepsTheFramesBeforeAndMakesTheOthersAnew) {
+class BranchSlow : public Branch {};
+
+TEST_F(BranchSlow, KeepsTheFramesBeforeAndMakesTheOthersAnew) {
   ASSERT_EQ(run({"--frames", "6"}).code, 0);
   const auto before = frames();
   const nlohmann::json old = record();
@@ -113,7 +115,7 @@ TEST_F(Branch, WithTheSameSceneComesToTheSameBytes) {
   for (const auto& [frame, facts] : frames()) EXPECT_EQ(facts.bytes, before.at(frame).bytes) << frame;
 }
 
-TEST_F(Branch, RefusesWhatTheStateCannotFollowAndTouchesNothing) {
+TEST_F(BranchSlow, RefusesWhatTheStateCannotFollowAndTouchesNothing) {
   ASSERT_EQ(run({"--frames", "6"}).code, 0);
   const auto before = frames();
   const std::string scene = read_file(out() / "scene.toml"), json = read_file(out() / "run.json");

@@ -253,7 +253,7 @@ TEST_F(ExportCommand, MapsBecomeGeoTiffs) {
   EXPECT_TRUE(read_file(out / "maps" / "deposit.tif") == read_file(run / "maps" / "max_thickness.tif")) << "the same map, from its text";
 }
 
-TEST_F(ExportCommand, WhatIsAskedWronglyIsToldBeforeAnythingIsWritten) {
+TEST_F(ExportCommandSlow, WhatIsAskedWronglyIsToldBeforeAnythingIsWritten) {
   const fs::path run = make_run("run", 3), out = folder_ / "out";
   struct Case {
     Arguments arguments;
@@ -288,7 +288,7 @@ TEST_F(ExportCommand, PathsMayHoldBlanksAccentsAndQuotes) {
   EXPECT_TRUE(fs::exists(out / "frames" / "skin.0002.vtp"));
 }
 
-TEST_F(ExportCommand, ARunThatLostFilesIsReadAsFarAsItGoes) {
+TEST_F(ExportCommandSlow, ARunThatLostFilesIsReadAsFarAsItGoes) {
   const fs::path run = make_run("run", 5), out = folder_ / "out";
   fs::remove(run / "frames" / "skin.0005.ply");
   fs::remove(run / "frames" / "skin.0003.ply");

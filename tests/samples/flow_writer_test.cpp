@@ -179,7 +179,9 @@ TEST_F(FlowOutputOfARun, HasADepositOfTheLavasVolumeOnTheTerrainsCells) {
   EXPECT_EQ(reached, s["inundated_m2"].back());
 }
 
-TEST_F(FlowOutput, KilledAfterACheckpointItGoesOnToTheSameBytes) {
+class FlowOutputSlow : public FlowOutput {};
+
+TEST_F(FlowOutputSlow, KilledAfterACheckpointItGoesOnToTheSameBytes) {
   const std::vector<std::string> every = {"output.thickness_every=2", "output.keep_checkpoints=2"};
   const fs::path whole = folder_ / "whole", broken = folder_ / "broken";
   ASSERT_EQ(gully(whole, 11, every), 0);
@@ -257,7 +259,7 @@ TEST_F(FlowOutput, RefusesAMapTooLargeAtTheScenesLineBeforeItWritesAnything) {
   }
 }
 
-TEST_F(FlowOutput, AnOutputPlaceInTheWayIsBadInputAndTheRunCanGoOn) {
+TEST_F(FlowOutputSlow, AnOutputPlaceInTheWayIsBadInputAndTheRunCanGoOn) {
   ASSERT_EQ(gully(folder_ / "whole", 5), 0);
   const fs::path out = folder_ / "out";
   write_file(out / "maps", "a file of that name");

@@ -116,7 +116,7 @@ TEST_F(MaungaWhauSlow, SkinEnclosesTheParticlesVolumeWithinFivePercentAndStaysNe
   });
 }
 
-TEST(MaungaWhauRun, WritesRegionsAndTellsOfThemInRunJson) {
+TEST(MaungaWhauRunSlow, WritesRegionsAndTellsOfThemInRunJson) {
   namespace fs = std::filesystem;
   const fs::path folder = fs::temp_directory_path() / fmt::format("effuse.maunga_whau_run.{}", ::getpid());
   fs::remove_all(folder);

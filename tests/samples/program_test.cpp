@@ -84,6 +84,7 @@ class ProgramTest : public testing::Test {
 
   fs::path folder_;
 };
+class ProgramTestSlow : public ProgramTest {};
 
 nlohmann::json run_json(const fs::path& folder) { return nlohmann::json::parse(read_file(folder / "run.json")); }
 
@@ -153,7 +154,7 @@ rate = "-3 m3/s"
   }
 }
 
-TEST_F(ProgramTest, TellsAMisspeltKeyThatIsRequiredOnceAndWithTheNameItMeant) {
+TEST_F(ProgramTestSlow, TellsAMisspeltKeyThatIsRequiredOnceAndWithTheNameItMeant) {
   const std::string sound = read_file(kScenes / "lava.toml");
   struct Case {
     std::string name, slip, says;
@@ -230,7 +231,7 @@ TEST_F(ProgramTest, AVentInDegreesIsToldHowTheyBecomeMetresOfTheMap) {
   EXPECT_EQ(metres.code, 0) << metres.err;
 }
 
-TEST_F(ProgramTest, SaysWhereTheTimeWentInALineAndAllOfItWhenAsked) {
+TEST_F(ProgramTestSlow, SaysWhereTheTimeWentInALineAndAllOfItWhenAsked) {
   const Outcome brief = effuse(run_gully(folder_ / "out", 2));
   ASSERT_EQ(brief.code, 0) << brief.err;
   EXPECT_EQ(count(brief.err, "took "), 1u) << brief.err;
@@ -295,7 +296,7 @@ TEST_F(ProgramTest, RefusesAVentBesideTheTerrain) {
   EXPECT_NE(outcome.err.find("not on the terrain"), std::string::npos) << outcome.err;
 }
 
-TEST_F(ProgramTest, RefusesAtOnceWhatWouldNeverEndOrFitInMemory) {
+TEST_F(ProgramTestSlow, RefusesAtOnceWhatWouldNeverEndOrFitInMemory) {
   for (const char* slip : {"lava.spacing=1 mm", "lava.vent[0].width=1e9", "lava.vent[0].rate=1e30", "lava.max_step=1e-30", "lava.stiffness=1e30", "film.time_scale=1e308",
                            "lava.air_exchange=1e300", "lava.diffusivity=1e300", "lava.rest_period=1e-300"}) {
     const Outcome outcome = effuse({"check", kScenes / "lava.toml", "--set", slip});
@@ -375,7 +376,7 @@ TEST_F(ProgramTest, TellsWhatIsWrongWithAnObstacleAtItsLine) {
   EXPECT_EQ(effuse({"check", with("[18, 24, 0]", "[18, 24, 0]")}).code, 0);
 }
 
-TEST_F(ProgramTest, RunsBodiesWithoutLavaAndGoesOnToTheSameBytes) {
+TEST_F(ProgramTestSlow, RunsBodiesWithoutLavaAndGoesOnToTheSameBytes) {
   const auto arguments = [&](const fs::path& out, const char* frames, const Arguments& more) {
     Arguments all = {"run", kScenes / "wrecking-arm.toml", "-o", out, "--frames", frames, "--set", "preview.width=160", "--set", "preview.height=90", "--set", "preview.samples=1", "--set",
                      "output.formats=[\"ply\", \"glb\"]", "--set", "output.checkpoint_every=3"};
@@ -476,7 +477,7 @@ TEST_F(ProgramTest, TheReadmesChainIsAScene) {
   EXPECT_EQ(more.code, 0) << more.err;
 }
 
-TEST_F(ProgramTest, NamesWhatBlocksAVentWhenItCannotGoOn) {
+TEST_F(ProgramTestSlow, NamesWhatBlocksAVentWhenItCannotGoOn) {
   std::string text = read_file(kScenes / "house.toml");
   const auto put = [&](const std::string& from, const std::string& to) { text.replace(text.find(from), from.size(), to); };
   put("gully.asc", (kScenes / "gully.asc").string());
@@ -533,7 +534,7 @@ TEST_F(ProgramTest, GivesTheSameFramesOnOneTwoAndFourThreads) {
   expect_same_files(folder_ / "1", folder_ / "4", 8 * 4);
 }
 
-TEST_F(ProgramTest, KilledInTheMidstOfAFrameItGoesOnToTheSameBytes) {
+TEST_F(ProgramTestSlow, KilledInTheMidstOfAFrameItGoesOnToTheSameBytes) {
   const fs::path whole = folder_ / "whole", broken = folder_ / "broken";
   ASSERT_EQ(effuse(run_gully(whole, 12)).code, 0);
   const pid_t pid = start(run_gully(broken, 12));
@@ -554,7 +555,7 @@ TEST_F(ProgramTest, KilledInTheMidstOfAFrameItGoesOnToTheSameBytes) {
     EXPECT_EQ(run_json(whole).at("effects").at("lava").at(figure), run_json(broken).at("effects").at("lava").at(figure)) << figure;
 }
 
-TEST_F(ProgramTest, InterruptedItCheckpointsAndSaysHowToGoOn) {
+TEST_F(ProgramTestSlow, InterruptedItCheckpointsAndSaysHowToGoOn) {
   const fs::path whole = folder_ / "whole", broken = folder_ / "broken";
   ASSERT_EQ(effuse(run_gully(whole, 10)).code, 0);
   const pid_t pid = start(run_gully(broken, 10));
@@ -575,7 +576,7 @@ TEST_F(ProgramTest, InterruptedItCheckpointsAndSaysHowToGoOn) {
   expect_same_files(whole, broken, 10 * 4);
 }
 
-TEST_F(ProgramTest, KeepsARunUnlessForcedAndARunOfAnotherSceneFromBeingResumed) {
+TEST_F(ProgramTestSlow, KeepsARunUnlessForcedAndARunOfAnotherSceneFromBeingResumed) {
   const fs::path out = folder_ / "out";
   ASSERT_EQ(effuse(run_gully(out, 3)).code, 0);
   const Outcome again = effuse(run_gully(out, 3));
@@ -631,7 +632,7 @@ TEST_F(ProgramTest, DescribesItsOwnFiles) {
   EXPECT_EQ(effuse({"check", out / "scene.toml"}).code, 0);
 }
 
-TEST_F(ProgramTest, FallsBackOnTheCheckpointBeforeADamagedOne) {
+TEST_F(ProgramTestSlow, FallsBackOnTheCheckpointBeforeADamagedOne) {
   const fs::path whole = folder_ / "whole", broken = folder_ / "broken";
   ASSERT_EQ(effuse(run_gully(whole, 9)).code, 0);
   ASSERT_EQ(effuse(run_gully(broken, 7)).code, 0);
@@ -684,7 +685,7 @@ TEST_F(ProgramTest, TheLineThatResumesIsAWholeCommand) {
   EXPECT_NE(outcome.err.find(R"(it'\''s here' --frames 200 --set 'lava.spacing=1.2 m')"), std::string::npos) << outcome.err;
 }
 
-TEST_F(ProgramTest, RefusesNumbersThatWouldNeverEndOrBreakTheFiles) {
+TEST_F(ProgramTestSlow, RefusesNumbersThatWouldNeverEndOrBreakTheFiles) {
   const fs::path out = folder_ / "out";
   for (const char* set : {"lava.spacing=1e-9", "lava.spacing=1e-300", "lava.vent[0].rate=1e300", "lava.vent[0].width=1e9", "lava.vent[0].width=100", "lava.vent[0].at=[2,50]", "lava.vent[0].at=[1e300,1]",
                           "film.time_scale=1e300", "film.fps=1e-300", "lava.max_step=1e-12", "lava.courant=1e-300", "lava.ground_exchange=1e300", "lava.diffusivity=1e9", "lava.air_temperature=1e6",
@@ -713,7 +714,7 @@ TEST_F(ProgramTest, RefusesAnOutputThatIsNoFolder) {
   EXPECT_EQ(effuse({"info", folder_ / "loop"}).code, 2);
 }
 
-TEST_F(ProgramTest, GoesOnWithoutAnybodyWhoListens) {
+TEST_F(ProgramTestSlow, GoesOnWithoutAnybodyWhoListens) {
   const auto shell = [&](const Arguments& arguments, const std::string& redirection) {
     std::string line = EFFUSE_PROGRAM;
     for (const std::string& word : arguments) line += " '" + word + "'";
@@ -733,7 +734,7 @@ TEST_F(ProgramTest, GoesOnWithoutAnybodyWhoListens) {
   EXPECT_EQ(shell({"effects", "--json"}, ">/dev/full 2>/dev/null"), 5);
 }
 
-TEST_F(ProgramTest, TakesNamesThatAreNotUtf8) {
+TEST_F(ProgramTestSlow, TakesNamesThatAreNotUtf8) {
   fs::copy_file(kScenes / "gully.asc", folder_ / "gully.asc");
   write("gully.prj",
         "PROJCS[\"R\xe9union\",GEOGCS[\"x\",DATUM[\"y\",SPHEROID[\"z\",6378137,298.257223563]],PRIMEM[\"Greenwich\",0],UNIT[\"Degree\",0.0174532925199433]],PROJECTION[\"Transverse_Mercator\"],"

@@ -50,8 +50,9 @@ class Render : public testing::Test {
 
   fs::path folder_;
 };
+using RenderSlow = Render;
 
-TEST_F(Render, ByTheSameCameraIsTheRunsOwnPictureAndByAnotherIsNot) {
+TEST_F(RenderSlow, ByTheSameCameraIsTheRunsOwnPictureAndByAnotherIsNot) {
   simulate("lava.toml", "--frames 3 --set lava.spacing=1.2 --set film.time_scale=30");
   const Outcome same = effuse(fmt::format("render '{}'", run().string()));
   ASSERT_EQ(same.code, 0) << same.err;
@@ -67,8 +68,6 @@ TEST_F(Render, ByTheSameCameraIsTheRunsOwnPictureAndByAnotherIsNot) {
   EXPECT_GT(apart(run() / "preview/preview.0002.png", folder_ / "along/render.0002.png"), 5);
   EXPECT_EQ(read_file(folder_ / "other/render.0002.exr").substr(0, 4), "\x76\x2f\x31\x01");
 }
-
-using RenderSlow = Render;
 
 TEST_F(RenderSlow, HasTheSmokeToo) {
   simulate("smoke.toml", "--frames 12");
@@ -88,7 +87,7 @@ TEST_F(RenderSlow, HasTheSmokeToo) {
   EXPECT_GT(render(), 3 * with_smoke);
 }
 
-TEST_F(Render, RefusesWhatItCannotDoAndKeepsWhatIsThere) {
+TEST_F(RenderSlow, RefusesWhatItCannotDoAndKeepsWhatIsThere) {
   simulate("lava.toml", "--frames 1 --set lava.spacing=1.2 --set film.time_scale=30");
   const std::string dir = "'" + run().string() + "'";
   const auto refused = [&](const std::string& words, const std::string& message) {

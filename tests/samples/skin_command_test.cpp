@@ -72,6 +72,7 @@ class SkinCommandTest : public testing::Test {
 
   fs::path folder_;
 };
+class SkinCommandTestSlow : public SkinCommandTest {};
 
 bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
@@ -183,7 +184,7 @@ TEST_F(SkinCommandTest, ADamBreakHasTheSameSkinFromPlyVtkAndBgeo) {
   expect_same_mesh(ply, mesh("dam.bgeo.skin.ply"), "BGEO");
 }
 
-TEST_F(SkinCommandTest, FilesWrittenByHandAllHaveTheSameSkin) {
+TEST_F(SkinCommandTestSlow, FilesWrittenByHandAllHaveTheSameSkin) {
   std::optional<TriMesh> first;
   for (const hand_written::File& file : hand_written::files()) {
     write(file.name, file.bytes);
@@ -197,7 +198,7 @@ TEST_F(SkinCommandTest, FilesWrittenByHandAllHaveTheSameSkin) {
   }
 }
 
-TEST_F(SkinCommandTest, SequencesKeepTheirNumbersAndMissingOnesAreReported) {
+TEST_F(SkinCommandTestSlow, SequencesKeepTheirNumbersAndMissingOnesAreReported) {
   const std::string particles = hand_written::xyz_text();
   for (const int frame : {2, 3, 5, 9, 10}) write(fmt::format("in.{:04}.xyz", frame), particles);
   write("in.other.xyz", "not one of them");
@@ -275,7 +276,7 @@ TEST_F(SkinCommandTest, TheSurfaceThresholdPutsAFlatSurfaceWhereTheDensityFallsT
   EXPECT_TRUE(contains(far.err, "--surface-threshold 0.1 with --smoothing-length 1.7")) << far.err;
 }
 
-TEST_F(SkinCommandTest, AFailedCheckIsExitCodeOneAndTheFileIsThereToLookAt) {
+TEST_F(SkinCommandTestSlow, AFailedCheckIsExitCodeOneAndTheFileIsThereToLookAt) {
   // A sponge, its triangles taken out to a whole spacing: walls cross.
   std::string sponge;
   for (std::uint64_t n = 0; n < 1500; ++n) sponge += fmt::format("{:.4f} {:.4f} {:.4f}\n", 4 * random_uniform(1, 0, n), 4 * random_uniform(1, 1, n), 4 * random_uniform(1, 2, n));
@@ -297,7 +298,7 @@ TEST_F(SkinCommandTest, AFailedCheckIsExitCodeOneAndTheFileIsThereToLookAt) {
   EXPECT_EQ(with({"-o", "sponge.ply", "--check", "--match-volume", "off"}).code, 0) << "as it is";
 }
 
-TEST_F(SkinCommandTest, BrokenFilesAndWrongNamesAreExitCodeTwoAndLeaveNothing) {
+TEST_F(SkinCommandTestSlow, BrokenFilesAndWrongNamesAreExitCodeTwoAndLeaveNothing) {
   write("good.xyz", "0 0 0\n1 0 0\n");
   write("bad.xyz", "0 0 0\n1 zero 0\n");
   write("cut.vtk", hand_written::vtk_binary().substr(0, 120));

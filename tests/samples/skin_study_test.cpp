@@ -176,7 +176,7 @@ TEST(Solids, ErrorsOfABallThatIsTooLargeAndOfOneWithADentAreWhatTheyAre) {
   EXPECT_FALSE(surface_error({}, sphere, 6000).solid);
 }
 
-TEST(Fill, PutsOneParticleIntoEachUnitOfVolumeAndDisorderHasNoRows) {
+TEST(FillSlow, PutsOneParticleIntoEachUnitOfVolumeAndDisorderHasNoRows) {
   for (const Solid& solid : solids()) {
     const std::vector<Vec3> rows = fill(solid.box, solid.distance, solid.volume, Filling::kLattice);
     const std::vector<Vec3> x = fill(solid.box, solid.distance, solid.volume, Filling::kDisorder);
@@ -194,7 +194,7 @@ TEST(Fill, PutsOneParticleIntoEachUnitOfVolumeAndDisorderHasNoRows) {
   }
 }
 
-TEST(DefaultSurface, OfSolidsFilledAsByALiquidHoldsEveryBarAtThreeVoxelSizes) {
+TEST(DefaultSurfaceSlow, OfSolidsFilledAsByALiquidHoldsEveryBarAtThreeVoxelSizes) {
   // One setting: LevelSetOptions as they come. Bars of Hausdorff and mean distance in spacings.
   for (const Solid& solid : solids()) {
     const std::vector<Vec3> x = fill(solid.box, solid.distance, solid.volume, Filling::kDisorder);

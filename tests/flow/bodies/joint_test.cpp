@@ -83,7 +83,7 @@ TEST(Joints, ThePeriodConvergesWithTheSquareOfTheStep) {
   EXPECT_NEAR(std::log2(coarse / fine), 2, 0.3) << coarse << " -> " << fine;
 }
 
-TEST(Joints, AChainOfTwentyHingesHoldsTogetherHoweverItSwings) {
+TEST(JointsSlow, AChainOfTwentyHingesHoldsTogetherHoweverItSwings) {
   for (const bool across : {false, true}) {
     RigidBodies world(worlds::awake());
     const auto link = Shape::box(Vec3(0.25, 0.05, 0.05));

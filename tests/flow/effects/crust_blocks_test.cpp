@@ -199,7 +199,7 @@ TEST(CrustBlocks, StiffOrStillCrustHasNone) {
   EXPECT_EQ(still.blocks.born(), 0u);
 }
 
-TEST(CrustBlocks, TheSameBitsOnAnyNumberOfThreadsAndAfterACheckpoint) {
+TEST(CrustBlocksSlow, TheSameBitsOnAnyNumberOfThreadsAndAfterACheckpoint) {
   std::string first;
   for (const int threads : {1, 3}) {
     const ThreadLimit limit(threads);

@@ -11,7 +11,7 @@ namespace {
 
 constexpr const char* kCube = "[[springs]]\npoints = 4\nsize = 1\nposition = [0, 0, 1.5]\ndensity = 100\nstiffness = 2000\ndamping = 20\n";
 
-TEST(SpringsEffect, ACubeFallsAndComesToRestOnTheGround) {
+TEST(SpringsEffectSlow, ACubeFallsAndComesToRestOnTheGround) {
   for (const char* scheme : {"symplectic_euler", "rk4", "implicit_euler"}) {
     SmallScene scene(std::string(kCube) + "contact_damping = 50\nscheme = \"" + scheme + "\"\n");
     scene.frames(24 * 8);

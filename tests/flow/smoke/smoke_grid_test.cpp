@@ -106,7 +106,7 @@ TEST(SmokeGridSlow, CarriesToSecondOrderWithTheCorrectionAndToFirstWithout) {
   EXPECT_LT(drift_error(40, true), drift_error(40, false) / 3);
 }
 
-TEST(SmokeGrid, KeepsSmokeAndHeatOfAClosedRoomThatHeatStirs) {
+TEST(SmokeGridSlow, KeepsSmokeAndHeatOfAClosedRoomThatHeatStirs) {
   for (const bool sharp : {true, false}) {
     SmokeOptions o = box(20, 20, 20);
     o.open.fill(false);
@@ -137,7 +137,7 @@ TEST(SmokeGrid, KeepsSmokeAndHeatOfAClosedRoomThatHeatStirs) {
 }
 
 /// A ball of smoke that an even wind carries out through an open side: what is left is what has not passed it.
-TEST(SmokeGrid, WhatLeavesThroughAnOpenSideIsWhatTheWindCarries) {
+TEST(SmokeGridSlow, WhatLeavesThroughAnOpenSideIsWhatTheWindCarries) {
   constexpr int n = 40;
   // The side's cells are taken as a whole: half a cell of the ball where it is densest.
   constexpr Real kWidth = 0.08;

@@ -122,7 +122,7 @@ TEST(Heat, TwoConductivitiesMeetAtTheContactTemperature) {
   EXPECT_NEAR((9 * T[m - 1] + T[m]) / 10, Ti, 0.01 * (T2 - T1));
 }
 
-TEST(Heat, FreezingFrontFollowsNeumann) {
+TEST(HeatSlow, FreezingFrontFollowsNeumann) {
   // 1150 degC melt under a wall of 25 degC, one melting point; the wall a perfect cooler on the crust columns.
   Stack stack(6, 36, 0.01);
   stack.expose_top();
@@ -290,7 +290,7 @@ TEST(Heat, PairsKeepTheEnergyAndMakeNoNewExtremes) {
   }
 }
 
-TEST(Heat, BudgetClosesWithEverythingAtOnceAndAnyStep) {
+TEST(HeatSlow, BudgetClosesWithEverythingAtOnceAndAnyStep) {
   for (const bool crust : {false, true}) {
     Cloud cloud(12);
     HeatOptions options;

@@ -111,7 +111,7 @@ void expect_rest(Real jitter, Real settle, Real until) {
   EXPECT_LT(worst, 1.2 * dx) << "no particle's is off by much more than a layer";
 }
 
-TEST(ModernLava, ALayerOnALatticeRestsUnderItsPressure) { expect_rest(0, 0.5, 3); }
+TEST(ModernLavaSlow, ALayerOnALatticeRestsUnderItsPressure) { expect_rest(0, 0.5, 3); }
 TEST(ModernLavaSlow, ALayerOnALatticeRestsForTenSecondsUnderItsPressure) { expect_rest(0, 2, 12); }
 
 // ---- films ----

@@ -23,7 +23,7 @@ TriMesh mixed() {
   return mesh;
 }
 
-TEST(NearTriangles, FindsWhatTheTreeFinds) {
+TEST(NearTrianglesSlow, FindsWhatTheTreeFinds) {
   for (const TriMesh& mesh : {mixed(), fields::maunga_whau().mesh()}) {
     const MeshTree tree(mesh.positions, mesh.triangles);
     const Real scale = std::sqrt(surface_area(mesh) / static_cast<Real>(mesh.triangles.size()));

@@ -75,7 +75,7 @@ TEST(BrokenRasters, PromisesTakeNoMemory) {
   expect_refused(folder.write("alone.flt", std::string(4000, '\0')));
 }
 
-TEST(BrokenRasters, NoiseAndTextUnderEveryEndingAreRefused) {
+TEST(BrokenRastersSlow, NoiseAndTextUnderEveryEndingAreRefused) {
   const TestFolder folder;
   std::string noise;
   for (std::uint64_t k = 0; k < 4000; ++k) noise += static_cast<char>(random_bits(5, 0, k));

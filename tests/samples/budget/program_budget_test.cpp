@@ -36,7 +36,7 @@ TEST(ProgramBudget, CheckSaysWhatItChoosesAndWhatThatComesTo) {
   EXPECT_NEAR(j.at("accuracy").at("wanted").get<double>(), 0.08, 1e-12);
 }
 
-TEST(ProgramBudget, ARunReportsPredictionBesideOutcomeAndItsResolvedSceneIsTheSameRun) {
+TEST(ProgramBudgetSlow, ARunReportsPredictionBesideOutcomeAndItsResolvedSceneIsTheSameRun) {
   const TestFolder folder;
   const std::string file = folder.write("scene.toml", scene("accuracy.front = \"5 %\"\n", "spacing = \"1.6 m\"\n"));
   const ProgramRun ran = folder.effuse(fmt::format("run {} -o {}/one", file, folder.path().string()));
@@ -58,7 +58,7 @@ TEST(ProgramBudget, ARunReportsPredictionBesideOutcomeAndItsResolvedSceneIsTheSa
   EXPECT_FALSE(k.contains("accuracy"));
 }
 
-TEST(ProgramBudget, ASpacingLeftOpenIsChosen) {
+TEST(ProgramBudgetSlow, ASpacingLeftOpenIsChosen) {
   const TestFolder folder;
   // Few frames of a wide error: rehearsals of some thousand particles, and a coarse run.
   const std::string absent = folder.write("absent.toml", scene("accuracy.front = \"40 %\"\n", "")), open = folder.write("open.toml", scene("accuracy.front = \"40 %\"\n", "spacing = \"auto\"\n"));
