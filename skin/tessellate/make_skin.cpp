@@ -124,8 +124,9 @@ Skin make_skin(const geometry::Points& points, Real volume, const geometry::Terr
     if (displaced) ParticleSurface(skin.surface).project(skin.mesh);
   }
   const std::vector<Vec3> ways = ways_out(skin.mesh);
-  // Before it is displaced, too: relief is a function of the place, and the level set's own volume is the lattice's to a hundredth of a voxel.
-  if (displaced) match_volume(skin, ways, terrain, spacing);
+  // Before vertices that the particles place are displaced, too: relief is a function of the place, and the level set's own volume is the
+  // lattice's to a hundredth of a voxel.
+  if (displaced && voronoi) match_volume(skin, ways, terrain, spacing);
   if (detail) skin.report.displace = displace_only(skin.mesh, points, terrain, *detail);
   skin.report.displace.refined = refined.rounds;
   skin.report.refined_enough = refined.enough;
