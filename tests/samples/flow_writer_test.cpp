@@ -205,7 +205,7 @@ TEST_F(FlowOutputSlow, KilledAfterACheckpointItGoesOnToTheSameBytes) {
   expect_same_outputs(whole, broken);
 }
 
-TEST_F(FlowOutput, ADamagedRecordSendsItBackToTheCheckpointBefore) {
+TEST_F(FlowOutputSlow, ADamagedRecordSendsItBackToTheCheckpointBefore) {
   const fs::path whole = folder_ / "whole", broken = folder_ / "broken";
   ASSERT_EQ(gully(whole, 9), 0);
   ASSERT_EQ(gully(broken, 7), 0);

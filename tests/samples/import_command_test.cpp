@@ -158,7 +158,9 @@ TEST_F(ImportCommandTest, AMeshGoesThroughInALocalFrame) {
   EXPECT_NE(refused(c).find("--resample: is for grids"), std::string::npos);
 }
 
-TEST_F(ImportCommandTest, ASceneTakesAMosaicAndItsOptions) {
+class ImportCommandTestSlow : public ImportCommandTest {};
+
+TEST_F(ImportCommandTestSlow, ASceneTakesAMosaicAndItsOptions) {
   ImportCommand half = command(kWhau, "south.tif");
   half.crop = {2667400, 6478700, 2668010, 6479135};
   run(half);

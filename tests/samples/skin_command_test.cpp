@@ -237,7 +237,7 @@ TEST_F(SkinCommandTest, WithoutARadiusItIsEstimatedAndSaid) {
   EXPECT_NEAR(geometry::signed_volume(mesh("skin.ply")), 8, 0.005 * 8);
 }
 
-TEST_F(SkinCommandTest, TheSurfaceThresholdPutsAFlatSurfaceWhereTheDensityFallsToIt) {
+TEST_F(SkinCommandTestSlow, TheSurfaceThresholdPutsAFlatSurfaceWhereTheDensityFallsToIt) {
   // A wide slab, its top at z = 0: half a spacing over the last layer. Where the density of a half-space falls to t by the
   // cubic spline of support 2, found by adding up layers far finer than particles.
   std::string slab;
@@ -518,7 +518,7 @@ TEST_F(SkinCommandSlow, EveryKindOfSkinIsDisplacedColouredAndSound) {
   EXPECT_NE(mesh("one.ply").positions, mesh("two.ply").positions);
 }
 
-TEST_F(SkinCommandTest, DetailMovesWithTheParticlesIdsAndWithoutThemSwims) {
+TEST_F(SkinCommandTestSlow, DetailMovesWithTheParticlesIdsAndWithoutThemSwims) {
   // Eight voxels on, where the smooth surface is the same again, in another order.
   const Vec3 by(4, -8, 0);
   const auto largest_difference = [&](bool ids, const std::string& kind, const std::string& tessellation) {
@@ -568,7 +568,7 @@ TEST_F(SkinCommandTest, TurningUpwardsLeavesColoursAsTheyAre) {
   EXPECT_NE(z.positions, y.positions);
 }
 
-TEST_F(SkinCommandTest, RefusesDetailThatNothingWouldShow) {
+TEST_F(SkinCommandTestSlow, RefusesDetailThatNothingWouldShow) {
   write("good.xyz", "0 0 0\n1 0 0\n");
   struct Case {
     Arguments arguments;
@@ -620,7 +620,7 @@ TEST_F(SkinCommandTest, WhatContradictsItselfIsExitCodeTwoWithTheReason) {
   EXPECT_EQ(inside_a_file.code, 2) << inside_a_file.err;
 }
 
-TEST_F(SkinCommandTest, TemperaturesThatNoLavaHasAreRefusedWithTheParticle) {
+TEST_F(SkinCommandTestSlow, TemperaturesThatNoLavaHasAreRefusedWithTheParticle) {
   const auto with = [&](const std::string& temperature, Arguments more) {
     write("hot.ply", "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\nproperty float temperature\nend_header\n0 0 0 1200\n1 0 0 " + temperature + "\n");
     more.insert(more.begin(), {"hot.ply", "-r", "0.5", "-o", "x.ply"});

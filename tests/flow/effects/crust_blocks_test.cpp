@@ -82,7 +82,7 @@ CrustBlockOptions easily() {
   return o;
 }
 
-TEST(CrustBlocks, MassOfLavaAndBlocksTogetherStays) {
+TEST(CrustBlocksSlow, MassOfLavaAndBlocksTogetherStays) {
   Flow flow(0.2, 3000, easily());
   const Real before = flow.lava.particle_mass() * static_cast<Real>(flow.lava.size());
   flow.run(1.2);

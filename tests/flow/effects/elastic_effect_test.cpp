@@ -13,7 +13,7 @@ namespace {
 
 constexpr const char* kBall = "[[elastic]]\nball = 0.5\nspacing = 0.3\nstep = 0.02\nposition = [0, 0, 0.8]\nyoungs_modulus = \"40 kPa\"\ndensity = 500\n";
 
-TEST(ElasticEffect, ABallFallsAndComesToRestOnTheGround) {
+TEST(ElasticEffectSlow, ABallFallsAndComesToRestOnTheGround) {
   SmallScene scene(std::string(kBall) + "damping = 0.05\n");
   // 1,280 triangles of the sphere hold 99.3 % of its volume, and weigh it.
   EXPECT_NEAR(scene.figure("mass_kg"), 500 * 0.5236, 3);

@@ -172,7 +172,7 @@ TEST(OceanEffect, SaysWhatDoesNotFit) {
   EXPECT_TRUE(contains(fault_of("[ocean]\nlevel = 0\ncell = 1\n[[ocean.wave]]\namplitude = 1\n"), "wavelength"));
 }
 
-TEST(SmokeEffect, RisesOverItsSourceAndOverHotLava) {
+TEST(SmokeEffectSlow, RisesOverItsSourceAndOverHotLava) {
   const std::string smoke = "[[smoke]]\nbox = [-4, -4, -1, 4, 4, 7]\ncell = 0.5\nstep = 0.1\n";
   EffectScene scene(smoke + "[[smoke.source]]\nat = [0, 0, 1]\nradius = 1\n");
   scene.frames(24);

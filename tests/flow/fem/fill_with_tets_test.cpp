@@ -38,7 +38,7 @@ Real least_dihedral(const TetMesh& m) {
   return least;
 }
 
-TEST(FillWithTets, TheirSurfaceIsClosedNearTheMeshAndTheirVolumeTendsToIts) {
+TEST(FillWithTetsSlow, TheirSurfaceIsClosedNearTheMeshAndTheirVolumeTendsToIts) {
   for (const TriMesh& mesh : {geometry::make_sphere(Vec3(1, 2, 3), 1, 4), geometry::make_torus(Vec3::Zero(), 1, 0.4, 48, 24)}) {
     const Real exact = geometry::signed_volume(mesh);
     Real before = 1e9;

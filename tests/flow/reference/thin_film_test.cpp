@@ -40,7 +40,7 @@ TEST(DamBreakReference, DoesNotDependOnItsGrid) {
   }
 }
 
-TEST(DamBreakReference, EndsAsHuppertsCurrent) {
+TEST(DamBreakReferenceSlow, EndsAsHuppertsCurrent) {
   const DamBreak dam{1, 1, 0.01};
   const GravityCurrent late(Spread::kPlanar, 0, 1, 0.01);
   // The start is forgotten: at 40 times the dam's length 1e-4 is left of it, and the solver's own first-order errors.
@@ -50,7 +50,7 @@ TEST(DamBreakReference, EndsAsHuppertsCurrent) {
   EXPECT_NEAR(state.wall_depth, late.depth(0, times[0]), 0.005 * state.wall_depth);
 }
 
-TEST(InclineReference, ReproducesTheTableOfBm2) {
+TEST(InclineReferenceSlow, ReproducesTheTableOfBm2) {
   // From an independent solution on a grid of 2.5 mm, whose widths are whole cells: half a cell of leeway on top of 1 %.
   const Real times[] = {32, 59, 122}, x[] = {.0962, .1437, .2362}, y[] = {.0688, .0938, .1288};
   const std::vector<InclineState> states = solve_incline_source({}, times);

@@ -119,7 +119,7 @@ TEST(Breaking, AWorldHasPiecesAndGoesOnFromACheckpoint) {
 }
 
 // Lava stands against a wall: it is pushed where the lava lies, so that a weak one breaks and a strong one does not.
-TEST(Breaking, LavaBreaksAWeakWall) {
+TEST(BreakingSlow, LavaBreaksAWeakWall) {
   const auto pieces = [](Real strength) {
     const geometry::Terrain terrain = flat();
     std::vector<PlacedBody> placed = wall_and_ball(strength);

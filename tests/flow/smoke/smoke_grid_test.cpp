@@ -50,7 +50,7 @@ TEST(SmokeGrid, WhatTheProjectionLeavesIsWhatItWasAskedFor) {
   }
 }
 
-TEST(SmokeGrid, APlumeIsSymmetric) {
+TEST(SmokeGridSlow, APlumeIsSymmetric) {
   SmokeOptions o = box(20, 20, 30);
   o.tolerance = 1e-9;
   o.swirl = 0.3;

@@ -346,7 +346,7 @@ TEST(Barrier, WallsAsHotAsTheLavaTakeNothing) {
 
 // Two half-spaces: through each square metre  2 (T - T_wall) / (1 / b_lava + 1 / b_wall) sqrt(t / pi)  in the time t, b = sqrt(k rho c);
 // the cold layer stays thinner than half of what is between the walls.
-TEST(Barrier, ColdWallsTakeWhatTwoHalfSpacesExchangeAndHotOnesGiveIt) {
+TEST(BarrierSlow, ColdWallsTakeWhatTwoHalfSpacesExchangeAndHotOnesGiveIt) {
   for (const Real wall : {288.15, 1700.0}) {
     Warm warm(wall);
     const HeatOptions& heat = warm.lava.options().heat;

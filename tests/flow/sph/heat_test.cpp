@@ -97,7 +97,7 @@ TEST(Heat, StepOfTemperatureSpreadsAsTheErrorFunction) {
   EXPECT_LT(worst / (T1 - T2), 0.005);  // the bar is 2 %
 }
 
-TEST(Heat, TwoConductivitiesMeetAtTheContactTemperature) {
+TEST(HeatSlow, TwoConductivitiesMeetAtTheContactTemperature) {
   const Stack stack(6, 40, 0.1);
   HeatOptions options = plain();
   options.solid_conductivity = 9 * options.conductivity;  // b three times as large

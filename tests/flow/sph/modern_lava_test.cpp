@@ -250,7 +250,7 @@ TEST(ModernLava, ADropFallsFreelyAndLands) {
   EXPECT_LT(fastest(lava), 0.1);
 }
 
-TEST(ModernLava, HeavyOverlapAtTheStartDoesNotExplode) {
+TEST(ModernLavaSlow, HeavyOverlapAtTheStartDoesNotExplode) {
   // Four times too dense, two of them at one place: the correction gives way without giving speed.
   ModernOptions o = isothermal(0.1, 500);
   ModernLava lava(o, {}, {floor_at()});

@@ -143,7 +143,7 @@ TEST(Solids, APistonPushesLavaAhead) {
 
 // A blade that turns through a pool, as fast as a spacing a step: what is above and below, before and behind stays finite and on its side
 // of the blade within each step; nothing is lost.
-TEST(Solids, ATurningBladeStirsAPool) {
+TEST(SolidsSlow, ATurningBladeStirsAPool) {
   const Real dx = 0.4;
   ModernOptions o = thick_lava(dx, 200, 0.05);
   Obstacles obstacles;

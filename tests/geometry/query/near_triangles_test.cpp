@@ -47,7 +47,7 @@ TEST(NearTrianglesSlow, FindsWhatTheTreeFinds) {
   }
 }
 
-TEST(NearTriangles, ASurfaceAnswersTheSameToTheBitWithItAndWithout) {
+TEST(NearTrianglesSlow, ASurfaceAnswersTheSameToTheBitWithItAndWithout) {
   for (const TriMesh& mesh : {mixed(), fields::maunga_whau().mesh()}) {
     const MeshSurface surface(mesh);
     const Real reach = 1.5 * std::sqrt(surface_area(mesh) / static_cast<Real>(mesh.triangles.size()));

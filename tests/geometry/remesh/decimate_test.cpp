@@ -59,7 +59,7 @@ TEST(Decimate, GoesDownToWhatTheShapeAllowsAndSaysSo) {
   EXPECT_TRUE(validate(mesh).solid());
 }
 
-TEST(Decimate, HillsKeepTheirBorderAndAttributes) {
+TEST(DecimateSlow, HillsKeepTheirBorderAndAttributes) {
   TriMesh mesh = hills(100);
   const TriMesh fine = mesh;
   const Decimated result = decimate(mesh, 4000);

@@ -63,7 +63,7 @@ TEST(Rasterize, AgreesWithTheSumOverAllParticlesInDouble) {
 
 // Four voxels a spacing: sums on every second voxel. A block of lava with a hole in it, a sheet of single particles that is torn, and
 // two lone ones; near the surface both must agree, and on the side of it everywhere.
-TEST(Rasterize, InterpolatedSumsAgreeWithTheSumOverAllParticles) {
+TEST(RasterizeSlow, InterpolatedSumsAgreeWithTheSumOverAllParticles) {
   Cloud cloud = fill(cube(5), 1, [](const Vec3& p) { return (p - Vec3(1, 1, 1)).norm() > 1.6; }, 0.15);
   for (int i = 0; i < 8; ++i)
     for (int j = 0; j < 8; ++j)
