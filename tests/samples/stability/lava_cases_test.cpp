@@ -304,6 +304,14 @@ std::string heat(const std::string& name, Real conductivity, Real melting_range,
   return std::abs(lava.total_enthalpy() / before - 1) < 1e-9 ? "" : fmt::format("{}: heat of {:.3g} of it is lost", name, lava.total_enthalpy() / before - 1);
 }
 
+/// A block at rest, its lowest side at z, of 1500 and 1200 K by turns.
+void add_hot_block(ModernLava& lava, Real z) {
+  const std::vector<Vec3> x = block(Vec3(0, 0, z), {6, 6, 6}, kDx);
+  std::vector<Real> T;
+  for (std::size_t i = 0; i < x.size(); ++i) T.push_back(i % 2 == 0 ? 1500 : 1200);
+  lava.add(x, std::vector<Vec3>(x.size(), Vec3::Zero()), T);
+}
+
 std::string cold_ground(bool guarded) {
   // Hot lava falls onto ice and is cooled by it and by the sky.
   ModernOptions o = fluid(500);
@@ -314,10 +322,7 @@ std::string cold_ground(bool guarded) {
   o.ground_temperature = 200;
   o.heat.guards.monotone_conduction = guarded;
   ModernLava lava(o, {}, {plane(Vec3::UnitZ(), Vec3::Zero(), Vec3::Zero(), 200)});
-  const std::vector<Vec3> x = block(Vec3(0, 0, 0.1), {6, 6, 6}, kDx);
-  std::vector<Real> T;
-  for (std::size_t i = 0; i < x.size(); ++i) T.push_back(i % 2 == 0 ? 1500 : 1200);
-  lava.add(x, std::vector<Vec3>(x.size(), Vec3::Zero()), T);
+  add_hot_block(lava, 0.1);
   LavaBounds b = on_floor(1.3 * kFall);
   b.coldest = 200 - 1e-6;
   b.hottest = 1500 + 1;  // viscous heating
@@ -342,10 +347,7 @@ std::string into_water(bool guarded) {
                     for (std::size_t i = 0; i < x.size(); ++i) wet[i] = x[i].z() < kLevel;
                   },
                   water});
-  const std::vector<Vec3> x = block(Vec3(0, 0, kLevel), {6, 6, 6}, kDx);
-  std::vector<Real> T;
-  for (std::size_t i = 0; i < x.size(); ++i) T.push_back(i % 2 == 0 ? 1500 : 1200);
-  lava.add(x, std::vector<Vec3>(x.size(), Vec3::Zero()), T);
+  add_hot_block(lava, kLevel);
   LavaBounds b = on_floor(1.3 * std::sqrt(2 * kGravity * (kLevel + 0.7)));
   b.coldest = 288 - 1e-6;
   b.hottest = 1500 + 1;  // viscous heating
