@@ -19,7 +19,7 @@ struct Machine {
   Real pressure_particle = 2e-8, pressure_pair = 1.5e-9;       ///< and iteration
   Real viscosity_particle = 5e-8, viscosity_pair = 3e-9;       ///< and iteration
   Real classic_pair = 1e-8;                                    ///< a pair and step of the classic lava, all of it
-  Real skin_particle = 1.2e-4;                                 ///< twenty triangles and frame: a particle of a sheet at voxels of half a spacing
+  Real skin_particle = 1.2e-4;                                 ///< twenty triangles and frame, but for asking the terrain: a particle of a sheet at voxels of half a spacing
   Real write_byte = 6e-9;                                      ///< of meshes and volumes
   Real picture_pixel = 1.2e-6;                                 ///< a pixel
 

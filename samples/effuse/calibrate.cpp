@@ -126,10 +126,10 @@ FrameCosts frame_costs() {
       triangles = static_cast<Real>(writer.write_frame(*loaded->simulation).triangles);
     }
     const Real seconds = static_cast<Real>(std::clock() - before) / CLOCKS_PER_SEC;
-    const Real skin = zone(profile, "skin."), picture = zone(profile, "preview") + zone(profile, "write.png"), files = zone(profile, "write.") - zone(profile, "write.png");
+    const Real ground = zone(profile, "skin.ground") + zone(profile, "skin.keep_volume"), skin = zone(profile, "skin.") - ground, picture = zone(profile, "preview") + zone(profile, "write.png"), files = zone(profile, "write.") - zone(profile, "write.png");
     Real bytes = 0;
     for (const fs::directory_entry& file : fs::directory_iterator(out / "frames")) bytes += static_cast<Real>(file.file_size());
-    const Real each = seconds / (skin + picture + files);
+    const Real each = seconds / (skin + ground + picture + files);
     least.skin_particle = std::min(least.skin_particle, each * skin / (triangles / 20));
     least.write_byte = std::min(least.write_byte, each * files / bytes);
     least.picture_pixel = std::min(least.picture_pixel, each * picture / (loaded->skin.picture.width * loaded->skin.picture.height));

@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ctime>
 
 #include "geometry/base/error.h"
 #include "geometry/base/parallel.h"
+#include "geometry/base/zones.h"
 #include "skin/tessellate/make_skin.h"
 
 namespace effuse {
@@ -20,7 +22,7 @@ constexpr double kLeastOwn = 0.5, kMostOwn = 20;  // times a machine's figures, 
 
 /// Triangles of a skin: of the level set's mesh twenty a particle at voxels of half a spacing, as Maunga Whau's thin flow has them
 /// (thicker ones have fewer), and refined to edges. By pixels: no finer.
-///   share  of them as those of its own particles that a rehearsal's have (skin_share)
+///   share  of them as those of its own particles that a rehearsal's have (sample_skin)
 double triangles(double particles, const skin::SkinSettings& s, double share) {
   particles *= share;
   const double meshed = std::pow(0.5 / s.voxel, 2), edge = s.detail.edge;
@@ -55,12 +57,17 @@ double memory_so_far() {
   return 1024.0 * static_cast<double>(usage.ru_maxrss);
 }
 
-/// Triangles of a skin over those that triangles() counts on, by the rehearsal's last particles: those that lie alone have a surface all round.
-double skin_share(const LoadedScene& loaded) {
+/// A skin of the rehearsal's last particles, beside what a machine's figures count on.
+struct SampleSkin {
+  double share = 1;   ///< triangles over those that triangles() counts on: particles that lie alone have a surface all round
+  double ground = 0;  ///< processor seconds a particle that asking the terrain takes: a mesh, many times what a plane or a grid takes
+};
+
+SampleSkin sample_skin(const LoadedScene& loaded) {
   const budget::Forecast& f = *loaded.forecast;
   const skin::SkinSettings& s = loaded.skin;
-  if (f.sample.empty() || (!s.ply && !s.obj && !s.glb && !s.vdb && !s.preview)) return 1;
-  const double spacing = f.rehearsed.back();
+  if (f.sample.empty() || (!s.ply && !s.obj && !s.glb && !s.vdb && !s.preview)) return {};
+  const double spacing = f.rehearsed.back(), count = static_cast<double>(f.sample.size());
   const std::vector<double> radius(f.sample.size(), spacing / 2);
   geometry::Points points;
   points.position = f.sample;
@@ -68,11 +75,22 @@ double skin_share(const LoadedScene& loaded) {
   skin::SkinOptions options = skin::skin_at(s, *loaded.terrain, 0, spacing);
   options.detail.reset();
   options.coarsen = 0;
+  const ThreadLimit one(1);
+  Profile profile;
   try {
-    const skin::Skin skin = skin::make_skin(points, std::pow(spacing, 3) * static_cast<double>(f.sample.size()), &*loaded.terrain, options);
-    return static_cast<double>(skin.mesh.triangles.size()) / (20 * static_cast<double>(f.sample.size()) * std::pow(0.5 / s.voxel, 2));
+    const ProfileScope scope(profile);
+    const std::clock_t before = std::clock();
+    const skin::Skin skin = skin::make_skin(points, std::pow(spacing, 3) * count, &*loaded.terrain, options);
+    const double seconds = static_cast<double>(std::clock() - before) / CLOCKS_PER_SEC;
+    // Zones are of the clock: of the processor's time, their share.
+    double all = 0, ground = 0;
+    for (const ZoneRow& zone : profile.zones()) {
+      all += zone.self_s;
+      if (zone.name == "skin.ground" || zone.name == "skin.keep_volume") ground += zone.self_s;
+    }
+    return {static_cast<double>(skin.mesh.triangles.size()) / (20 * count * std::pow(0.5 / s.voxel, 2)), all > 0 ? seconds * ground / all / count : 0};
   } catch (const InputError&) {
-    return 1;  // particles that no skin can be made of: the run will say so
+    return {};  // particles that no skin can be made of: the run will say so
   }
 }
 
@@ -130,13 +148,14 @@ Cost cost_of(const LoadedScene& loaded, const budget::Machine& machine) {
   const bool drawn = skin.preview || (skin.ply && solids.any_moves());
   const bool any = skin.ply || skin.obj || skin.glb || skin.vdb || skin.vtp || skin.usda || skin.preview;
   const double start_bytes = std::max(memory_at_start(loaded.terrain->mesh().positions.size(), skin), cost.rehearsed ? memory_so_far() : 0);
-  const double share = cost.rehearsed ? skin_share(loaded) : 1;
+  const SampleSkin sample = cost.rehearsed ? sample_skin(loaded) : SampleSkin{};
+  const double share = sample.share;
   const double own_bytes = disk_per_frame(sum.mean_particles, skin, share);
   const double pixels = skin.preview ? 1.0 * skin.picture.width * skin.picture.height : 0;
   double frame_s = 5e-6 * sum.drawn + (skin.preview ? 4e-8 : 2e-8) * sum.cells;
   if (cost.rehearsed) {
     // A skin goes by its voxels, files by their bytes, a picture by its pixels.
-    const double own = any ? machine.skin_particle * share * sum.mean_particles * std::pow(0.5 / skin.voxel, 2) + machine.write_byte * own_bytes + machine.picture_pixel * pixels : 0;
+    const double own = any ? (machine.skin_particle * share * std::pow(0.5 / skin.voxel, 2) + sample.ground) * sum.mean_particles + machine.write_byte * own_bytes + machine.picture_pixel * pixels : 0;
     frame_s += machine.on_threads(own, thread_count());
     cost.processor_seconds += scene.frames * own;
   } else {
