@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "flow/effects/crust_blocks.h"
 #include "flow/effects/lava_rheology.h"
@@ -48,6 +49,7 @@ class ModernLavaEffect final : public Effect {
     for (const Vent& vent : vents) {
       if (vent.rate <= 0) continue;
       vents_.push_back({vent.from, vent.to, vent.width, vent.start, vent.stop});
+      coldest_ = std::min(coldest_, vent.temperature);
       const Real area = static_cast<Real>(vent.lattice(options.spacing).size()) * options.spacing * options.spacing;
       openings_.push_back({vent.start, vent.stop, options.courant * options.spacing * area / vent.rate, vent.lattice(options.spacing), (vent.from + vent.to) / 2});
     }
@@ -78,6 +80,11 @@ class ModernLavaEffect final : public Effect {
     return {lava_.positions(), lava_.velocities(), heat_ ? lava_.heat().surface_temperature() : lava_.temperatures(), lava_.surface(), spacing()};
   }
   std::vector<flow::Opening> openings() const override { return vents_; }
+  std::vector<std::string> remarks() const override {
+    const HeatOptions& heat = lava_.options().heat;
+    if (!heat.on || !heat.crust || vents_.empty() || coldest_ > heat.crust_temperature) return {};
+    return {fmt::format("comes out at {:g} K, not above heat.crust_temperature, {:g} K: all of it is crust from the start", coldest_, heat.crust_temperature)};
+  }
 
   void step(Real t_end) override {
     if (crammed_steps_ >= kMostCrammedSteps)
@@ -312,6 +319,7 @@ class ModernLavaEffect final : public Effect {
   std::optional<CrustBlocks> blocks_;
   std::vector<Mouth> openings_;
   std::vector<flow::Opening> vents_;
+  Real coldest_ = std::numeric_limits<Real>::infinity();  // of what comes out of them [K]
   bool quenched_ = false;  // by water
   std::vector<std::string> figure_names_;  // of obstacles and bodies
   ModernReport last_;

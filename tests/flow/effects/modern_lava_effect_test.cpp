@@ -60,6 +60,15 @@ double unaccounted(const std::map<std::string, double>& f) {
   return std::abs(f.at("vent_J") + f.at("viscous_J") - f.at("stored_J") - lost - f.at("left_J")) / lost;
 }
 
+TEST(ModernLavaEffect, RemarksThatWhatComesOutIsCrustAlready) {
+  const geometry::Terrain terrain = slope(0.1);
+  EXPECT_TRUE(build(terrain, {{"lava.preset", "etna"}})->remarks().empty());
+  EXPECT_TRUE(build(terrain, {{"lava.vent[0].temperature", "1300 K"}})->remarks().empty()) << "it has no crust";
+  const auto remarks = build(terrain, {{"lava.preset", "etna"}, {"lava.vent[0].temperature", "1300 K"}})->remarks();
+  ASSERT_EQ(remarks.size(), 1u);
+  EXPECT_NE(remarks[0].find("comes out at 1300 K, not above heat.crust_temperature"), std::string::npos) << remarks[0];
+}
+
 TEST(ModernLavaEffect, GivesTheFiguresThatTheSeriesReads) {
   const geometry::Terrain terrain = slope(0.3);
   const auto effect = build(terrain, {{"lava.preset", "etna"}});
