@@ -60,7 +60,7 @@ struct NamedCloud {
 
   geometry::Points view() const {
     geometry::Points p;
-    p.position = x, p.velocity = v, p.radius = radius, p.temperature = temperature, p.age = age, p.id = id;
+    p.position = x, p.velocity = v, p.radius = radius, p.temperature = temperature, p.age = age, p.opacity = opacity, p.id = id;
     return p;
   }
 };

@@ -16,6 +16,7 @@ struct Points {
   std::span<const Real> temperature;     ///< [K]
   std::span<const Real> crust;           ///< 0 molten .. 1 solid
   std::span<const Real> age;             ///< [s] since emission
+  std::span<const Real> opacity;         ///< 0 not to be seen .. 1; of what flies, not of lava
   std::span<const std::uint64_t> id;     ///< never reused
   std::span<const std::uint8_t> surface; ///< 1: near the surface
   /// Material coordinates [m], two sets born anew in turn (at emission and then periodically set to the

@@ -15,7 +15,7 @@ namespace effuse::importers {
 namespace {
 
 /// What a particle can have, besides its position.
-enum Field : std::size_t { kRadius, kVelocity, kTemperature, kCrust, kAge, kId, kRest, kRest2, kFields };
+enum Field : std::size_t { kRadius, kVelocity, kTemperature, kCrust, kAge, kOpacity, kId, kRest, kRest2, kFields };
 
 struct FieldNames {
   const char* title;
@@ -28,6 +28,7 @@ constexpr std::array<FieldNames, kFields> kNames = {{{"radius", 1, {"radius", "p
                                                      {"temperature", 1, {"temperature", "temp"}},
                                                      {"crust", 1, {"crust"}},
                                                      {"age", 1, {"age"}},
+                                                     {"opacity", 1, {"opacity", "alpha"}},
                                                      {"id", 1, {"id", "ids", "idp", "particle_id", "globalids"}},
                                                      {"rest", 3, {"rest"}},
                                                      {"rest2", 3, {"rest2"}}}};
@@ -168,6 +169,7 @@ PointCloud assemble(const std::string& name, std::vector<Vec3> position, std::sp
   scalars(kTemperature, cloud.temperature);
   scalars(kCrust, cloud.crust);
   scalars(kAge, cloud.age);
+  scalars(kOpacity, cloud.opacity);
   vectors(kRest, cloud.rest);
   vectors(kRest2, cloud.rest2);
   if (const Source& source = sources[kId]; source.any()) {

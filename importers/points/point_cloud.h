@@ -14,7 +14,7 @@ struct PointCloud {
   std::vector<Real> radius;       ///< > 0
   std::vector<Vec3> velocity;     ///< [m/s]
   std::vector<Real> temperature;  ///< [K], as the file has it
-  std::vector<Real> crust, age;
+  std::vector<Real> crust, age, opacity;
   std::vector<std::uint64_t> id;
   std::vector<Vec3> rest, rest2;
   std::vector<std::string> notes;  ///< what was left out, one sentence each
@@ -31,6 +31,7 @@ struct PointCloud {
     p.temperature = temperature;
     p.crust = crust;
     p.age = age;
+    p.opacity = opacity;
     p.id = id;
     p.rest = rest;
     p.rest2 = rest2;

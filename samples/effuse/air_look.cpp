@@ -55,8 +55,7 @@ skin::Metadata with_color(skin::Metadata about, const Vec3& color) {
 }
 
 skin::Metadata with_look(skin::Metadata about, const NamedCloud& cloud) {
-  if (cloud.look == NamedCloud::Look::kPuffs || cloud.soft) return about;
-  about.emplace_back("look", cloud.look == NamedCloud::Look::kGlow ? "glow" : "grains");
+  about.emplace_back("look", cloud.look == NamedCloud::Look::kPuffs ? "puffs" : cloud.soft ? "flames" : cloud.look == NamedCloud::Look::kGlow ? "glow" : "grains");
   return with_color(std::move(about), cloud.color);
 }
 
@@ -72,7 +71,8 @@ bool take_look(const skin::Metadata& about, NamedCloud& cloud) {
   const auto look = std::find_if(about.begin(), about.end(), [](const auto& one) { return one.first == "look"; });
   if (!color || look == about.end()) return false;
   cloud.color = *color;
-  cloud.look = look->second == "glow" ? NamedCloud::Look::kGlow : NamedCloud::Look::kGrains;
+  cloud.soft = look->second == "flames";
+  cloud.look = look->second == "puffs" ? NamedCloud::Look::kPuffs : cloud.soft || look->second == "glow" ? NamedCloud::Look::kGlow : NamedCloud::Look::kGrains;
   return true;
 }
 

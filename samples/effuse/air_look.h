@@ -18,7 +18,7 @@ void add_cloud(skin::Air& air, const flow::NamedCloud& cloud, Real exposure);
 void add_volume(skin::Air& air, geometry::GridVolume volume, const Vec3& color);
 
 /// How clouds and volumes are drawn, among what travels with their files, and read again from there: for pictures made of files
-/// (`effuse render`). A cloud of points that says no look, or puffs or flames, whose opacity files do not hold, is nothing to draw: false.
+/// (`effuse render`). A cloud of points that says no look is nothing to draw: false.
 skin::Metadata with_color(skin::Metadata about, const Vec3& color);
 skin::Metadata with_look(skin::Metadata about, const flow::NamedCloud& cloud);
 std::optional<Vec3> color_of(const skin::Metadata& about);

@@ -96,6 +96,7 @@ TriMesh mesh_of_points(const geometry::Points& points) {
   add_attribute(mesh, "temperature", points.temperature);
   add_attribute(mesh, "crust", points.crust);
   add_attribute(mesh, "age", points.age);
+  add_attribute(mesh, "opacity", points.opacity);
   add_attribute(mesh, "id", points.id);
   add_attribute(mesh, "rest", points.rest);
   add_attribute(mesh, "rest2", points.rest2);

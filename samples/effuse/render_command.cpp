@@ -149,7 +149,7 @@ ExitCode render_run(const RenderCommand& command, const CommonOptions& common) {
   progress.end();
   std::string names;
   for (const std::string& name : run.left_out()) names += (names.empty() ? "" : ", ") + name;
-  if (!names.empty()) log_warning(fmt::format("not drawn: {}, whose files do not say how dense they are; the run's own pictures have them", names));
+  if (!names.empty()) log_warning(fmt::format("not drawn: {}, whose files do not say how they look; the run's own pictures have them", names));
 
   nlohmann::ordered_json done = {{"ok", true}, {"folder", folder.string()}, {"pictures", made}};
   for (const char* kind : {"mp4", "gif"}) {

@@ -220,7 +220,7 @@ RunFolder::Shown RunFolder::shown(int frame) const {
         cloud.v = points.velocity.empty() ? std::vector<Vec3>(points.size(), Vec3::Zero()) : points.velocity;
         cloud.radius = points.radius.empty() ? std::vector<Real>(points.size(), 0.01) : points.radius;
         cloud.temperature = points.temperature.empty() ? std::vector<Real>(points.size(), 0) : points.temperature;
-        cloud.opacity.assign(points.size(), 1);
+        cloud.opacity = points.opacity.empty() ? std::vector<Real>(points.size(), 1) : points.opacity;
         add_cloud(shown.air, cloud, kShutter * time_scale_ / fps_);
       }
     } else if (pattern.ends_with(".vdb")) {

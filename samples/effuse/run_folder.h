@@ -47,7 +47,7 @@ class RunFolder {
     skin::Air air;
   };
   Shown shown(int frame) const;
-  /// Names of what flies and is not in the files as it looks: puffs and flames. Of the frames shown so far.
+  /// Names of what flies and whose files do not say how it looks. Of the frames shown so far.
   const std::vector<std::string>& left_out() const { return left_out_; }
 
   /// flow.csv as curves with the times of its lines; both empty when it is not there. Throws InputError when it is damaged.

@@ -36,7 +36,7 @@ struct Quantity {
 /// What the points have, besides positions and ids.
 std::vector<Quantity> quantities(const Points& p, const char* radius, const char* velocity) {
   std::vector<Quantity> all = {{radius, p.radius, {}}, {velocity, {}, p.velocity}, {"temperature", p.temperature, {}}, {"crust", p.crust, {}},
-                               {"age", p.age, {}},     {"rest", {}, p.rest},       {"rest2", {}, p.rest2}};
+                               {"age", p.age, {}},     {"opacity", p.opacity, {}}, {"rest", {}, p.rest},       {"rest2", {}, p.rest2}};
   std::erase_if(all, [](const Quantity& q) { return q.empty(); });
   return all;
 }

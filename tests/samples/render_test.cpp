@@ -87,6 +87,29 @@ TEST_F(RenderSlow, HasTheSmokeToo) {
   EXPECT_GT(render(), 3 * with_smoke);
 }
 
+TEST_F(RenderSlow, HasFlamesPuffsAndSparksAsDenseAsTheyAre) {
+  simulate("campfire.toml", "--frames 20");
+  const auto render = [&] {
+    const Outcome made = effuse(fmt::format("render '{}' --frames 20 --force", run().string()));
+    EXPECT_EQ(made.code, 0) << made.err;
+    EXPECT_EQ(made.err.find("not drawn"), std::string::npos) << made.err;
+    return apart(run() / "preview/preview.0020.png", run() / "render/render.0020.png");
+  };
+  const double with_all = render();
+  EXPECT_LT(with_all, 0.5);
+  int without = 0;
+  for (const fs::directory_entry& entry : fs::directory_iterator(run() / "frames")) {
+    const std::string name = entry.path().filename().string(), bytes = entry.path().extension() == ".ply" ? read_file(entry.path()) : "";
+    if (!name.ends_with(".0020.ply") || bytes.find("property float opacity") == std::string::npos) continue;
+    ++without;
+    const fs::path aside = folder_ / name;
+    fs::rename(entry.path(), aside);
+    EXPECT_GT(render(), with_all + 0.05) << name << " is not in the picture";
+    fs::rename(aside, entry.path());
+  }
+  EXPECT_GE(without, 2);
+}
+
 TEST_F(RenderSlow, RefusesWhatItCannotDoAndKeepsWhatIsThere) {
   simulate("lava.toml", "--frames 1 --set lava.spacing=1.2 --set film.time_scale=30");
   const std::string dir = "'" + run().string() + "'";

@@ -76,7 +76,8 @@ TEST(ParticlesEffect, SparksComeOutOfTheVentWhileItIsOpen) {
   EXPECT_EQ(scene.figure("sparks", "born"), 0);
   scene.frames(24);
   EXPECT_EQ(scene.figure("sparks", "born"), 50);
-  for (const Vec3& x : scene.effect("sparks").clouds()[0].x) EXPECT_LE(x.head<2>().norm(), 1 + 1e-9);
+  const std::vector<NamedCloud> clouds = scene.effect("sparks").clouds();
+  for (const Vec3& x : clouds.at(0).x) EXPECT_LE(x.head<2>().norm(), 1 + 1e-9);
 }
 
 TEST(ParticlesEffect, TheyComeOffLavaWhereItIsHot) {

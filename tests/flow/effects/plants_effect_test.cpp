@@ -144,7 +144,7 @@ TEST(PlantsEffect, BurnDownBesideSomethingHotFarOnesDoNotAndACheckpointGoesOnToT
   const geometry::TriMesh flames = scene.plants().meshes().at(1).mesh;
   EXPECT_GT(flames.triangles.size(), 0u);
   EXPECT_EQ(scene.plants().meshes()[1].name, "plants-flames");
-  const auto& glow = scene.plants().meshes()[0].mesh.attributes.at("glow").values;
+  const std::vector<float> glow = scene.plants().meshes()[0].mesh.attributes.at("glow").values;
   EXPECT_GT(*std::max_element(glow.begin(), glow.end()), 0.3f);
   const std::string bytes = scene.simulation->checkpoint("key");
   PlantsScene again(text, 0, hot);

@@ -37,6 +37,7 @@ PointCloud cloud_of(std::size_t n, std::uint64_t first_id = 0) {
     cloud.temperature.push_back(number(7));
     cloud.crust.push_back(number(8));
     cloud.age.push_back(number(9));
+    cloud.opacity.push_back(number(16));
     cloud.rest.push_back(vector(10));
     cloud.rest2.push_back(vector(13));
     cloud.id.push_back(first_id + 3 * i);
@@ -51,6 +52,7 @@ void expect_same(const PointCloud& a, const PointCloud& b, const std::string& wh
   EXPECT_EQ(a.temperature, b.temperature) << what;
   EXPECT_EQ(a.crust, b.crust) << what;
   EXPECT_EQ(a.age, b.age) << what;
+  EXPECT_EQ(a.opacity, b.opacity) << what;
   EXPECT_EQ(a.id, b.id) << what;
   EXPECT_EQ(a.rest, b.rest) << what;
   EXPECT_EQ(a.rest2, b.rest2) << what;
