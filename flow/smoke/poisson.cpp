@@ -80,13 +80,16 @@ void Poisson::finish(Level& l) {
 }
 
 /// What the neighbours of c give to it: sum of openness times x. Weights to cells beyond the grid are 0, and x is padded.
+/// kEdge: of a cell at a side of the grid. Behind it in memory lies another row's cell, which may be changing: not read.
+template <bool kEdge>
 Real Poisson::row(const Level& l, std::size_t c) {
   const auto nx = static_cast<std::size_t>(l.n[0]), layer = l.pad;
   const Real* x = l.x.data() + l.pad + c;
-  Real sum = l.to_x[c] * x[1] + l.to_y[c] * x[nx] + l.to_z[c] * x[layer];
-  if (c >= 1) sum += l.to_x[c - 1] * x[-1];
-  if (c >= nx) sum += l.to_y[c - nx] * *(x - nx);
-  if (c >= layer) sum += l.to_z[c - layer] * *(x - layer);
+  const auto through = [](float open, const Real* other) { return kEdge && open == 0 ? Real(0) : open * *other; };
+  Real sum = through(l.to_x[c], x + 1) + through(l.to_y[c], x + nx) + through(l.to_z[c], x + layer);
+  if (c >= 1) sum += through(l.to_x[c - 1], x - 1);
+  if (c >= nx) sum += through(l.to_y[c - nx], x - nx);
+  if (c >= layer) sum += through(l.to_z[c - layer], x - layer);
   return sum;
 }
 
@@ -96,10 +99,11 @@ void Poisson::sweep(Level& l, int color) {
   parallel_for(
       ny * nz,
       [&](std::size_t r) {
-        const std::size_t start = (r % ny + r / ny + static_cast<std::size_t>(color)) % 2;
+        const std::size_t j = r % ny, start = (j + r / ny + static_cast<std::size_t>(color)) % 2;
+        const bool edge = j == 0 || j + 1 == ny;
         for (std::size_t i = start; i < nx; i += 2) {
           const std::size_t c = r * nx + i;
-          if (l.diagonal[c] > 0) l.x[l.pad + c] = (l.b[c] + row(l, c)) / l.diagonal[c];
+          if (l.diagonal[c] > 0) l.x[l.pad + c] = (l.b[c] + (edge || i == 0 || i + 1 == nx ? row<true>(l, c) : row<false>(l, c))) / l.diagonal[c];
         }
       },
       kRows);
@@ -130,7 +134,7 @@ void Poisson::cycle(std::size_t at) {
             for (std::size_t j = 2 * J; j < std::min(2 * J + 2, ny); ++j)
               for (std::size_t i = 2 * I; i < std::min(2 * I + 2, nx); ++i) {
                 const std::size_t c = (k * ny + j) * nx + i;
-                if (l.diagonal[c] > 0) sum += l.b[c] - (l.diagonal[c] * l.x[l.pad + c] - row(l, c));
+                if (l.diagonal[c] > 0) sum += l.b[c] - (l.diagonal[c] * l.x[l.pad + c] - row<false>(l, c));
               }
           next.b[r * mx + I] = sum / 2;
         }

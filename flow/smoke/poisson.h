@@ -51,6 +51,7 @@ class Poisson {
   static Level coarsened(const Level& fine);
   static void finish(Level& level);
   static void sweep(Level& level, int color);
+  template <bool kEdge>
   static Real row(const Level& level, std::size_t c);
   void cycle(std::size_t l);
 

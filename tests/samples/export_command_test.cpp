@@ -408,8 +408,9 @@ TEST_F(ExportCommand, TwoDoNotWriteToOneFolder) {
   const fs::path run = make_run("run", 12, 40), out = folder_ / "out";
   const pid_t first = start({"export", run, "--to", "vtp,usda", "-o", out});
   for (int k = 0; k < 2000 && count_below(out) < 2; ++k) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  fs::create_directories(folder_ / "second");
+  ::kill(first, SIGSTOP);  // it does not get done before the other has begun
   const Outcome second = effuse({"export", run, "--to", "vtp", "-o", out});
+  ::kill(first, SIGCONT);
   EXPECT_EQ(wait(first).code, 0);
   EXPECT_EQ(second.code, 2);
   EXPECT_NE(second.err.find("another effuse is writing"), std::string::npos) << second.err;

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <link.h>
 #include <sys/resource.h>
 #include <time.h>
 
@@ -30,6 +31,19 @@ double cpu_s() {
   timespec t{};
   ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+/// Bytes of the program's own variables: its segments that can be written.
+std::int64_t variables() {
+  std::int64_t bytes = 0;
+  ::dl_iterate_phdr(
+      [](dl_phdr_info* program, std::size_t, void* to) {
+        for (int k = 0; k < program->dlpi_phnum; ++k)
+          if (const auto& segment = program->dlpi_phdr[k]; segment.p_type == PT_LOAD && (segment.p_flags & PF_W)) *static_cast<std::int64_t*>(to) += static_cast<std::int64_t>(segment.p_memsz);
+        return 1;  // the program is the first; the libraries are the same ones
+      },
+      &bytes);
+  return bytes;
 }
 
 int run(int argc, char** argv) {
@@ -84,6 +98,7 @@ int run(int argc, char** argv) {
   j["state"] = hash.hex();
   j["before_main"] = told(at_start);
   j["whole"] = told(end);
+  j["variables"] = variables();
   rusage usage{};
   ::getrusage(RUSAGE_SELF, &usage);
   j["peak_rss"] = static_cast<std::int64_t>(usage.ru_maxrss) * 1024;
