@@ -111,6 +111,26 @@ TEST(SolidWorld, AClosedBoxAndWhatIsInItKeepTheirMomentumTogether) {
   for (const Vec3& p : lava.positions()) EXPECT_LT(world.poses()[0].body(p).cwiseAbs().maxCoeff(), 1.25) << "out of the box";
 }
 
+// Lava slumps over pebbles that are far lighter than its particles, of 40 kg: it takes them along, it does not shoot them.
+TEST(SolidWorld, PebblesLighterThanAParticleGoNoFasterThanTheLava) {
+  const Real dx = 0.25;
+  for (const Real edge : {0.1, 0.02, 0.002}) {
+    std::vector<PlacedBody> pebbles;
+    for (int k = 0; k < 12; ++k) pebbles.push_back(block(Vec3::Constant(edge / 2), 2000, Vec3(1.3 + 0.2 * (k % 4), 0.4 + 0.3 * (k / 4), edge / 2)));
+    SolidWorld world({still("tray", sph::tray(Vec3::Zero(), Vec3(3, 1.5, 3)))}, pebbles, nullptr);
+    ModernLava lava(sph::thick_lava(dx, 300, 0.02), {}, {sph::ground_at(-100)}, {}, world.solids());
+    const std::vector<Vec3> x = sph::lattice_block(4, 6, 6, dx);
+    fill(lava, x, std::vector<Vec3>(x.size(), Vec3::Zero()));
+    Real fastest = 0, lavas = 0;
+    while (lava.time() < 2) {
+      lavas = std::max(lavas, lava.step(0.02).max_speed);
+      for (std::size_t b = 0; b < pebbles.size(); ++b) fastest = std::max(fastest, world.velocity(b).norm());
+    }
+    EXPECT_GT(fastest, 0.1) << "never reached, edge " << edge;
+    EXPECT_LT(fastest, 2 * lavas) << "edge " << edge;
+  }
+}
+
 struct Floating {
   Real draught = 0, level = 0, speed = 0, tilt = 0;
 };
