@@ -71,6 +71,18 @@ void refuse_blocked_vents(const std::vector<PlannedVent>& plans, const std::vect
   }
 }
 
+/// Bodies that the lava's walls would take for something a hundred times as large.
+void refuse_specks(const World& world, Real spacing, const Place& place, std::vector<Fault>& faults) {
+  constexpr Real kLeast = 0.01;  // spacings across
+  if (!world.bodies) return;
+  for (const PlacedBody& each : *world.bodies) {
+    Box3 box;
+    for (const Vec3& corner : each.mesh.positions) box.extend(corner);
+    if (box.sizes().norm() < kLeast * spacing)
+      faults.push_back({place, fmt::format("lava.spacing: particles of {:.4g} m beside body '{}', {:.3g} m across, wanted bodies no smaller than a hundredth of a particle", spacing, each.name, box.sizes().norm())});
+  }
+}
+
 /// Particles that the ground, or all vents, are no match for: nothing would flow.
 void refuse_giant_particles(const std::vector<PlannedVent>& vents, Real spacing, const Place& place, const geometry::Terrain& terrain, std::vector<Fault>& faults) {
   constexpr Real kAcross = 4, kWider = 5;  // particles on the ground's narrower side at least; spacings a vent may be narrower than one
@@ -121,6 +133,7 @@ EffectPlan read_lava(Parameters& p, Real duration) {
   plan.misfits = [vents, spacing = model.spacing, obstacles = model.obstacles, place = p.place("model"), size = p.place("spacing")](const World& world) {
     std::vector<Fault> faults;
     if (spacing > 0) refuse_giant_particles(vents, spacing, size, *world.terrain, faults);
+    refuse_specks(world, spacing, size, faults);
     const bool solids = (world.obstacles && !world.obstacles->empty()) || (world.bodies && !world.bodies->empty());
     if (!obstacles && solids) faults.push_back({place, "the classic model knows the terrain only: [[obstacle]] and [[body]] go with model = \"modern\""});
     refuse_blocked_vents(vents, place_vents(vents, *world.terrain, faults), world, spacing, faults);

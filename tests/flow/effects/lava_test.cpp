@@ -232,6 +232,21 @@ TEST(ReadLava, RefusesAVentWithSomethingOverIt) {
   }
 }
 
+TEST(ReadLava, RefusesBodiesAHundredTimesSmallerThanAParticle) {
+  const geometry::Terrain ground = geometry::Terrain::from_height_field(geometry::make_plane(Vec2(40, 40), 0, 0, 8), {}, 288);
+  for (const Real edge : {0.005, 0.02}) {
+    std::vector<PlacedBody> bodies(1);
+    bodies[0].name = "speck";
+    bodies[0].mesh = geometry::make_box(Vec3::Zero(), Vec3::Constant(edge));
+    bodies[0].pose.position = Vec3(-15, 0, 1);
+    const std::vector<Fault> faults = read(Lines{}).plan.misfits({.terrain = &ground, .bodies = &bodies});
+    ASSERT_EQ(faults.size(), edge < 0.01 ? 1u : 0u);
+    if (!faults.empty()) {
+      EXPECT_TRUE(contains(faults[0].message, "particles of 1 m beside body 'speck', 0.00866 m across")) << faults[0].message;
+    }
+  }
+}
+
 TEST(ReadLava, ToldFaultsAreAllOfThemAtOnce) {
   const Read r =
       read({{"lava.support", "9"}, {"lava.heat.convection", "-1"}, {"lava.rheology.law", "vtf"}, {"lava.vent[0].start", "-2 s"}});
