@@ -24,6 +24,7 @@ using Mat6 = Eigen::Matrix<Real, 6, 6>;
 // time to see what the first crack relieves.
 constexpr Real kTogether = 0.99, kTogetherFast = 0.9;
 constexpr Real kFast = 2;          ///< strengths
+constexpr Real kFar = 5;           ///< strengths: of a body loaded beyond that breaks at once what is; bond by bond thousands of cells would take hours
 constexpr Real kLeastGap = 0.05;   ///< of the root of an interface's area: centres are no nearer than that
 
 Mat3 cross(const Vec3& r) {
@@ -198,9 +199,9 @@ std::vector<std::vector<Index>> break_bonds(const FracturedBody& body, std::span
       continue;
     }
     whole.reset();
-    const Real together = worst > kFast * strength ? kTogetherFast : kTogether;
+    const Real together = worst > kFast * strength ? std::min(kTogetherFast * worst, kFar * strength) : kTogether * worst;
     for (const BondStress& s : stresses)
-      if (s.stress > strength && s.stress >= together * worst) broken[s.bond] = 1;
+      if (s.stress > strength && s.stress >= together) broken[s.bond] = 1;
     for (std::vector<Index>& part : bonded_groups(body, group, broken)) open.push_back(std::move(part));
   }
   std::sort(done.begin(), done.end(), [](const auto& a, const auto& b) { return a[0] < b[0]; });

@@ -59,8 +59,9 @@ class BondSolver {
 /// What of `which` hangs together: groups by their lowest cell, rising.
 std::vector<std::vector<Index>> bonded_groups(const geometry::FracturedBody& body, std::span<const Index> which, std::span<const std::uint8_t> broken);
 
-/// Breaks bonds in turn, the worst first (and those within a hundredth of it, of a body loaded to twice its strength a tenth), with loads shared anew each time, until what is left holds
-/// below the strength. Groups that this leaves, which are loose from each other.
+/// Breaks bonds in turn, the worst first (and those within a hundredth of it; of a body loaded to twice its strength a tenth, and all beyond five
+/// times it), with loads shared anew each time, until what is left holds below the strength. Groups that this leaves, which are loose from
+/// each other.
 ///   loads     one a cell of `which`, not in equilibrium
 ///   smallest  [m^3]: groups of less volume do not break any further
 ///   broken    in and out

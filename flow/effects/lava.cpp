@@ -9,6 +9,7 @@
 #include "flow/effects/classic_lava_effect.h"
 #include "flow/effects/modern_lava_effect.h"
 #include "geometry/base/error.h"
+#include "geometry/collide/convex_hull.h"
 
 namespace effuse::flow {
 
@@ -36,21 +37,49 @@ void tell_of_the_other_model(Parameters& p, bool modern) {
     tell(kModern, "modern");
 }
 
-/// Lava that comes out in or right beside an obstacle has nowhere to go.
+/// Of the vent's sites from the shape, up to `reach` [m]; 0: one is in it.
+Real way_between(const std::vector<Vec3>& sites, const geometry::CollisionMesh& shape, const geometry::RigidPose& pose, Real reach) {
+  Real nearest = std::numeric_limits<Real>::infinity();
+  for (const Vec3& site : sites) nearest = std::min(nearest, shape.inside(pose.body(site)) ? 0 : shape.signed_distance(pose.body(site), reach));
+  return nearest;
+}
+
+/// Lava that comes out in or right beside an obstacle has nowhere to go; a body in its way is thrown off, or wedged in.
 void refuse_blocked_vents(const std::vector<PlannedVent>& plans, const std::vector<sph::Vent>& vents, const World& world, Real spacing, std::vector<Fault>& faults) {
-  if (!world.obstacles || spacing <= 0) return;
+  if (spacing <= 0) return;
   std::size_t placed = 0;
   for (const PlannedVent& plan : plans) {
     if (!plan.located || placed == vents.size()) continue;
     const sph::Vent& vent = vents[placed++];
-    for (const PlacedObstacle& each : *world.obstacles) {
-      const geometry::RigidPose pose = each.track.at(vent.start);
-      Real nearest = std::numeric_limits<Real>::infinity();
-      for (const Vec3& site : vent.lattice(spacing)) nearest = std::min(nearest, each.shape.inside(pose.body(site)) ? 0 : each.shape.signed_distance(pose.body(site), 2 * spacing));
-      if (nearest >= 2 * spacing) continue;
-      faults.push_back({plan.place, fmt::format("obstacle '{}' is {} the vent when it opens, wanted at least two spacings, {:.3g} m, between them", each.name,
-                                                nearest <= 0 ? std::string("over") : fmt::format("{:.2g} m from", nearest), 2 * spacing)});
+    const std::vector<Vec3> sites = vent.lattice(spacing);
+    const auto keep_off = [&](const char* kind, const std::string& name, Real way, const char* wanted, Real room) {
+      if (way >= room) return;
+      faults.push_back({plan.place, fmt::format("{} '{}' is {} the vent when it opens, wanted at least {}, {:.3g} m, between them", kind, name, way <= 0 ? std::string("over") : fmt::format("{:.2g} m from", way), wanted, room)});
+    };
+    if (world.obstacles)
+      for (const PlacedObstacle& each : *world.obstacles) keep_off("obstacle", each.name, way_between(sites, each.shape, each.track.at(vent.start), 2 * spacing), "two spacings", 2 * spacing);
+    if (!world.bodies || vent.start > 0) continue;  // nobody knows where bodies will be by then
+    Box3 around;
+    for (const Vec3& site : sites) around.extend(site);
+    for (const PlacedBody& each : *world.bodies) {
+      Real radius = spacing;
+      for (const Vec3& corner : each.mesh.positions) radius = std::max(radius, corner.norm() + spacing);
+      if (around.squaredExteriorDistance(each.pose.position) > radius * radius) continue;
+      const geometry::CollisionMesh shape(each.hull ? geometry::mesh_of(geometry::make_convex_hull(each.mesh.positions)) : each.mesh);
+      keep_off("body", each.name, way_between(sites, shape, each.pose, spacing), "a spacing", spacing);
     }
+  }
+}
+
+/// Bodies that the lava's walls would take for something a hundred times as large.
+void refuse_specks(const World& world, Real spacing, const Place& place, std::vector<Fault>& faults) {
+  constexpr Real kLeast = 0.01;  // spacings across
+  if (!world.bodies) return;
+  for (const PlacedBody& each : *world.bodies) {
+    Box3 box;
+    for (const Vec3& corner : each.mesh.positions) box.extend(corner);
+    if (box.sizes().norm() < kLeast * spacing)
+      faults.push_back({place, fmt::format("lava.spacing: particles of {:.4g} m beside body '{}', {:.3g} m across, wanted bodies no smaller than a hundredth of a particle", spacing, each.name, box.sizes().norm())});
   }
 }
 
@@ -104,6 +133,7 @@ EffectPlan read_lava(Parameters& p, Real duration) {
   plan.misfits = [vents, spacing = model.spacing, obstacles = model.obstacles, place = p.place("model"), size = p.place("spacing")](const World& world) {
     std::vector<Fault> faults;
     if (spacing > 0) refuse_giant_particles(vents, spacing, size, *world.terrain, faults);
+    refuse_specks(world, spacing, size, faults);
     const bool solids = (world.obstacles && !world.obstacles->empty()) || (world.bodies && !world.bodies->empty());
     if (!obstacles && solids) faults.push_back({place, "the classic model knows the terrain only: [[obstacle]] and [[body]] go with model = \"modern\""});
     refuse_blocked_vents(vents, place_vents(vents, *world.terrain, faults), world, spacing, faults);

@@ -21,6 +21,12 @@ Box3 widened(Box3 box, Real by) {
   return {box.min() - Vec3::Constant(by), box.max() + Vec3::Constant(by)};
 }
 
+/// Makes it so many times as heavy.
+void weigh(Movable& body, Real times) {
+  body.inverse_mass /= times;
+  body.inverse_inertia /= times;
+}
+
 constexpr std::size_t kBlock = 64;  // particles that ask together first; they lie in memory as in space
 constexpr Real kAway = 0.5;          // cosine: faces of the two sides of a plate look away from each other
 constexpr std::size_t kFew = 16;    // obstacles near a block that each of its particles asks by itself
@@ -69,7 +75,11 @@ void Solids::restart(Real dt) {
 }
 
 void Solids::go(Real time, Real dt) {
-  if (!movable_.empty() && options_.moved) options_.moved(movable_, dt);
+  if (!movable_.empty() && options_.moved) {
+    std::vector<Movable> moved = movable_;
+    for (std::size_t b = 0; b < moved.size(); ++b) weigh(moved[b], 1 / heavier_[b]);
+    options_.moved(moved, dt);
+  }
   if (options_.move) options_.move(time, time + dt);
 }
 
@@ -77,6 +87,14 @@ void Solids::stand(Real time, Real dt) {
   fastest_ = 0;
   before_.clear();
   if (options_.movable) options_.movable(before_);
+  number_.clear();
+  heavier_.clear();
+  for (Movable& body : before_) {
+    if (body.surface >= number_.size()) number_.resize(body.surface + 1, kNotMovable);
+    number_[body.surface] = static_cast<Index>(heavier_.size());
+    heavier_.push_back(std::max(1.0, mass_ * body.inverse_mass));
+    weigh(body, heavier_.back());
+  }
   movable_ = before_;
   if (!options_.move) return;
   geometry::Obstacles& all = *options_.obstacles;
@@ -160,12 +178,11 @@ void Solids::add_walls(std::span<const Vec3> x, Real reach, Walls& walls) {
     for (Index c = 0; c < count_[k]; ++c) {
       const Contact& contact = contacts_[q * kMost + c];
       const Real friction = backing_[q * kMost + c] * friction_of(contact.surface);
-      const auto body = std::find_if(movable_.begin(), movable_.end(), [&](const Movable& m) { return m.surface == contact.surface; });
-      const bool moves = body != movable_.end();
+      const Index body = number_of(contact.surface);
       merged_.walls[place++] = {.normal = contact.normal, .distance = contact.distance, .reach = contact.distance, .surface = contact.surface,
                                 .velocity = contact.surface_velocity, .temperature = contact.surface_temperature, .effusivity = effusivity_of(contact.surface), .friction = friction, .across = across_[q * kMost + c],
-                                .mirrors = true, .movable = moves ? static_cast<Index>(body - movable_.begin()) : kNotMovable,
-                                .arm = moves ? Vec3(contact.point - body->centre) : Vec3::Zero()};
+                                .mirrors = true, .movable = body,
+                                .arm = body != kNotMovable ? Vec3(contact.point - movable_[body].centre) : Vec3::Zero()};
       speed_ = std::max(speed_, contact.surface_velocity.norm());
     }
     ++q;
@@ -246,7 +263,11 @@ geometry::SlideReport Solids::slide(std::span<const Index> which, std::span<cons
   met_.assign(n, 0);
   const geometry::SlideReport report = geometry::slide_all(*options_.obstacles, at_, way_, speed_at_, std::span(&radius_, 1), {}, met_);
   for (std::size_t q = 0; q < n; ++q) {
-    if (met_[q] != 0 && options_.push && speed_at_[q] != v[near_[q]]) options_.push(met_[q], mass_ * (v[near_[q]] - speed_at_[q]), at_[q]);
+    if (met_[q] != 0 && options_.push && speed_at_[q] != v[near_[q]]) {
+      const Index body = number_of(met_[q]);  // none: an obstacle, or a piece that came in this step
+      const Real heavier = body != kNotMovable ? heavier_[body] : 1;
+      options_.push(met_[q], mass_ / heavier * (v[near_[q]] - speed_at_[q]), heavier > 1 ? before_[body].centre : at_[q]);
+    }
     x[near_[q]] = at_[q];
     v[near_[q]] = speed_at_[q];
   }

@@ -64,6 +64,9 @@ struct SolidOptions {
 /// hundredth on the mean. A duct 3 by 5 particles wide lets through 8 % too much, one 3 by 10 wide 2 %. Things whose size is a kernel's are
 /// felt too strongly where lava is deep: a ball 3 spacings in radius sinks within 10 % of what Stokes and Haberman say down to 5 radii below the
 /// surface, a quarter too slowly at 7 (why: even_out.h). Held still it is lifted by 0.82 of what it displaces (0.87 at 5 spacings, 0.89 at 6).
+///
+/// A body lighter than a particle answers lava as if it were as heavy as one: its walls take it for as large, and their push on a
+/// thousandth of that mass would be more than the solves' single precision can undo. Momentum is kept with heavier bodies only.
 class Solids {
  public:
   /// radius: particles' centres stay so far off surfaces where there is room [m]. mass: of a particle [kg]. widest: of walls face to
@@ -112,12 +115,15 @@ class Solids {
     return surface < options_.friction.size() ? options_.friction[surface] : 1;
   }
   Real effusivity_of(Index surface) const { return surface < options_.effusivity.size() ? options_.effusivity[surface] : 0; }
+  Index number_of(Index surface) const { return surface < number_.size() ? number_[surface] : kNotMovable; }
   void look_behind(std::span<const Vec3> x, Real reach, const Walls& ground);
 
   SolidOptions options_;
   Real radius_, mass_, widest_;
   Real speed_ = 0, fastest_ = 0;
   std::vector<Movable> movable_, before_;
+  std::vector<Real> heavier_;  // these bodies' masses are so many times their own
+  std::vector<Index> number_;  // of the body among them with a surface
   std::vector<Index> near_, met_;
   std::vector<Vec3> at_, way_, speed_at_;
   std::vector<geometry::Contact> contacts_;

@@ -266,6 +266,20 @@ ViscosityResult ViscositySolver::solve(const ParticleSystem& s, Real density, st
     for (Body& body : body_) body.p = body.inverse * body.r + beta * body.p;
     ++result.iterations;
   }
+  // Beside bodies, what momentum went astray, the sum of r, is given back by a step along that direction, the same for all: where nothing
+  // is held, A leaves such a step as it is, and the sum is then zero to rounding.
+  Vec3 astray = Vec3::Zero();
+  for (Index i = 0; i < n && bodies > 0; ++i) astray += r_[i];
+  for (const Body& body : body_) astray += body.r.head<3>();
+  if (astray.squaredNorm() > 0) {
+    parallel_for(n, [&](std::size_t i) { p_[i] = s.is_fixed(i) ? Vec3(Vec3::Zero()) : astray; }, 2048);
+    for (Body& body : body_) body.p << astray, Vec3::Zero();
+    if (const Real pAp = multiply(p_, Ap_, &Body::p).preconditioned; pAp > 0) {
+      const Real alpha = astray.squaredNorm() / pAp;
+      parallel_for(n, [&](std::size_t i) { v[i] += alpha * p_[i]; }, 2048);
+      for (Body& body : body_) body.v += alpha * body.p;
+    }
+  }
   for (std::size_t b = 0; b < bodies; ++b) {
     s.movable[b].velocity = body_[b].v.head<3>();
     s.movable[b].spin = body_[b].v.tail<3>();

@@ -34,7 +34,8 @@ struct ViscosityResult {
 };
 
 /// Bodies that lava moves (ParticleSystem::movable) are solved for together with it: their velocities at the step's end drag, and are
-/// dragged by, the particles beside them, so that any stiffness and lightness does.
+/// dragged by, the particles beside them, so that any stiffness and lightness does. Where no wall but theirs holds the lava, momentum of
+/// both together is then kept to rounding, whatever the tolerance.
 ///
 /// Solves  v - dt a(v) = v0  for the velocities at the step's end by conjugate gradients, matrix-free, with the
 /// inverse 3x3 diagonal blocks as preconditioner. Unconditionally stable.

@@ -8,6 +8,7 @@
 #include "flow/sph/lava_presets.h"
 #include "geometry/base/error.h"
 #include "geometry/base/units.h"
+#include "geometry/procedural/primitives.h"
 #include "geometry/terrain/plane.h"
 #include "tests/flow/effects/scene_lines.h"
 
@@ -205,6 +206,45 @@ TEST(ReadLava, RefusesParticlesTooLargeForTheGroundOrForAVent) {
   const std::vector<Fault> faults = faults_of("9 m", "1 m");
   ASSERT_EQ(faults.size(), 1u);
   EXPECT_TRUE(contains(faults[0].message, "from a vent 1 m across")) << faults[0].message;
+}
+
+TEST(ReadLava, RefusesAVentWithSomethingOverIt) {
+  const geometry::Terrain ground = geometry::Terrain::from_height_field(geometry::make_plane(Vec2(40, 40), 0, 0, 8), {}, 288);
+  const geometry::TriMesh box = geometry::make_box(Vec3::Constant(-1), Vec3::Constant(1));
+  const auto told = [&](const Vec3& at, bool moves, const char* start) {
+    std::vector<PlacedObstacle> obstacles;
+    std::vector<PlacedBody> bodies(moves ? 1 : 0);
+    geometry::PoseKey key;
+    key.pose.position = at;
+    if (!moves) obstacles.push_back({"box", geometry::CollisionMesh(box), geometry::PoseTrack(std::vector<geometry::PoseKey>{key})});
+    for (PlacedBody& body : bodies) body.name = "box", body.mesh = box, body.pose.position = at;
+    std::string text;
+    for (const Fault& fault : read({{"lava.vent[0].start", start}}).plan.misfits({.terrain = &ground, .obstacles = &obstacles, .bodies = &bodies})) text += fault.message + "\n";
+    return text;
+  };
+  // The vent is 3 m across about (5, 5), particles are 1 m apart: the outermost of its sites lie 1 m off its middle.
+  for (const bool moves : {false, true}) {
+    const std::string kind = moves ? "body" : "obstacle";
+    EXPECT_TRUE(contains(told(Vec3(5, 5, 0.5), moves, "0 s"), kind + " 'box' is over the vent when it opens")) << told(Vec3(5, 5, 0.5), moves, "0 s");
+    EXPECT_TRUE(contains(told(Vec3(7.5, 5, 0.5), moves, "0 s"), kind + " 'box' is 0.5 m from the vent when it opens")) << told(Vec3(7.5, 5, 0.5), moves, "0 s");
+    EXPECT_EQ(told(Vec3(9.5, 5, 0.5), moves, "0 s"), "");
+    EXPECT_EQ(told(Vec3(5, 5, 0.5), moves, "10 s") == "", moves) << "where a body will be by then nobody knows";
+  }
+}
+
+TEST(ReadLava, RefusesBodiesAHundredTimesSmallerThanAParticle) {
+  const geometry::Terrain ground = geometry::Terrain::from_height_field(geometry::make_plane(Vec2(40, 40), 0, 0, 8), {}, 288);
+  for (const Real edge : {0.005, 0.02}) {
+    std::vector<PlacedBody> bodies(1);
+    bodies[0].name = "speck";
+    bodies[0].mesh = geometry::make_box(Vec3::Zero(), Vec3::Constant(edge));
+    bodies[0].pose.position = Vec3(-15, 0, 1);
+    const std::vector<Fault> faults = read(Lines{}).plan.misfits({.terrain = &ground, .bodies = &bodies});
+    ASSERT_EQ(faults.size(), edge < 0.01 ? 1u : 0u);
+    if (!faults.empty()) {
+      EXPECT_TRUE(contains(faults[0].message, "particles of 1 m beside body 'speck', 0.00866 m across")) << faults[0].message;
+    }
+  }
 }
 
 TEST(ReadLava, ToldFaultsAreAllOfThemAtOnce) {

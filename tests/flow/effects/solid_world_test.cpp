@@ -46,7 +46,6 @@ TEST(SolidWorld, LavaAndBodyKeepTheirMomentumTogether) {
   const Real dx = 0.25;
   ModernOptions o = sph::thick_lava(dx, 300, 0.02);
   o.gravity = Vec3::Zero();
-  o.viscosity_tolerance = 1e-9;
   bodies::BodyOptions still;
   still.gravity = Vec3::Zero();
   const Vec3 half(0.4, 0.5, 0.6);
@@ -73,6 +72,62 @@ TEST(SolidWorld, LavaAndBodyKeepTheirMomentumTogether) {
     }
     EXPECT_LT((momentum(lava, world, 1) - before).norm(), 1e-6 * scale) << density;
     EXPECT_GT(moved, density < 1000 ? 0.5 : 0.02) << "nothing was given";
+  }
+}
+
+// A closed box, free to go itself, with lava and a block in it, at the default tolerances.
+TEST(SolidWorld, AClosedBoxAndWhatIsInItKeepTheirMomentumTogether) {
+  const Real dx = 0.25;
+  ModernOptions o = sph::thick_lava(dx, 300, 0.02);
+  o.gravity = Vec3::Zero();
+  bodies::BodyOptions weightless;
+  weightless.gravity = Vec3::Zero();
+  const Vec3 half(0.4, 0.5, 0.6), middle = Vec3::Constant(1.25);
+  PlacedBody box = block(Vec3::Constant(1.6), 1500, middle);
+  box.hull = false;
+  TriMesh room = geometry::make_box(Vec3::Constant(-1.25), Vec3::Constant(1.25));
+  const auto first = static_cast<Index>(box.mesh.positions.size());
+  for (const Vec3& p : room.positions) box.mesh.positions.push_back(p);
+  for (const auto& [a, b, c] : room.triangles) box.mesh.triangles.push_back({first + a, first + c, first + b});
+  box.velocity = Vec3(-0.5, 0, 0.2);
+  box.spin = Vec3(0, 0.3, 0);
+  SolidWorld world({}, {box, block(half, 2000, middle)}, nullptr, weightless);
+  ASSERT_NEAR(world.bodies().mass(0), 1500 * (std::pow(3.2, 3) - std::pow(2.5, 3)), 1) << "it is hollow";
+  ModernLava lava(o, {}, {sph::ground_at(-1000)}, {}, world.solids());
+  std::vector<Vec3> x, v;
+  for (const Vec3& p : sph::lattice_block(10, 10, 8, dx))
+    if (((p - middle).cwiseAbs() - half).maxCoeff() > 0.4 * dx) {
+      x.push_back(p);
+      v.push_back(Vec3(1, 0.5, 0) + Vec3(0.3, -0.2, 1).cross(p - middle));
+    }
+  fill(lava, x, v);
+  const Vec3 before = momentum(lava, world, 2), box_before = world.bodies().momenta()[0];
+  const Real scale = before.norm();
+  for (int k = 0; k < 50; ++k) {
+    lava.step(0.02);
+    EXPECT_LT((momentum(lava, world, 2) - before).norm(), 1e-6 * scale) << "step " << k;
+  }
+  EXPECT_GT((world.bodies().momenta()[0] - box_before).norm(), 0.1 * scale) << "nothing was given";
+  for (const Vec3& p : lava.positions()) EXPECT_LT(world.poses()[0].body(p).cwiseAbs().maxCoeff(), 1.25) << "out of the box";
+}
+
+// Lava slumps over pebbles that are far lighter than its particles, of 40 kg: it takes them along, it does not shoot them.
+TEST(SolidWorld, PebblesLighterThanAParticleGoNoFasterThanTheLava) {
+  const Real dx = 0.25;
+  for (const Real edge : {0.1, 0.02, 0.002}) {
+    std::vector<PlacedBody> pebbles;
+    for (int k = 0; k < 12; ++k) pebbles.push_back(block(Vec3::Constant(edge / 2), 2000, Vec3(1.3 + 0.2 * (k % 4), 0.4 + 0.3 * (k / 4), edge / 2)));
+    SolidWorld world({still("tray", sph::tray(Vec3::Zero(), Vec3(3, 1.5, 3)))}, pebbles, nullptr);
+    ModernLava lava(sph::thick_lava(dx, 300, 0.02), {}, {sph::ground_at(-100)}, {}, world.solids());
+    const std::vector<Vec3> x = sph::lattice_block(4, 6, 6, dx);
+    fill(lava, x, std::vector<Vec3>(x.size(), Vec3::Zero()));
+    Real fastest = 0, lavas = 0;
+    while (lava.time() < 2) {
+      lavas = std::max(lavas, lava.step(0.02).max_speed);
+      for (std::size_t b = 0; b < pebbles.size(); ++b) fastest = std::max(fastest, world.velocity(b).norm());
+    }
+    EXPECT_GT(fastest, 0.1) << "never reached, edge " << edge;
+    EXPECT_LT(fastest, 2 * lavas) << "edge " << edge;
   }
 }
 
