@@ -2,7 +2,7 @@
 # sh samples/gallery.sh [SCENE...]: runs the scenes of samples/scenes (all, or those named) as they stand, one after the other, and writes
 # samples/gallery.md: of each the first sentence of its comment, its picture, what it took. Simulated and meshed alone, without a picture
 # a frame: times are of the processor, which a busy machine does not lengthen. A scene that has no picture yet gets one, of the frame that
-# its line "# gallery: frame 90" names or else its last (needs ffmpeg). Lines of scenes that were not run stay. Frames go to out/gallery
+# its line "# gallery: frame 90" names or else its last (needs ffmpeg); "# gallery: none" leaves a scene out. Lines of scenes that were not run stay. Frames go to out/gallery
 # and are removed when their scene is done.
 set -eu
 cd "$(dirname "$0")/.."
@@ -24,6 +24,7 @@ mkdir -p out/gallery
 for name in "$@"; do
   scene=samples/scenes/$name.toml
   out=out/gallery/$name
+  if grep -q '^# gallery: none' "$scene"; then continue; fi
   echo "$name"
   "$effuse" run "$scene" -o "$out" --force --quiet --json --set 'output.formats=["ply"]' --set preview.pictures=false > "$out.json" || { echo "$name failed" >&2; exit 1; }
   seconds=$(sed -n 's/^ "processor_seconds": \([0-9.e+-]*\).*/\1/p' "$out.json" | head -1)
