@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/base/check.h"
 #include "geometry/base/error.h"
 #include "geometry/collide/collision_mesh_internal.h"
 
@@ -163,6 +164,16 @@ Real CollisionMesh::signed_distance(const Vec3& p, Real reach) const {
 bool CollisionMesh::inside(const Vec3& p) const {
   if (impl_->report.solids == 0 || !impl_->bounds.contains(p)) return false;
   return signed_distance(p) < 0;
+}
+
+bool CollisionMesh::follow(std::span<const Vec3> positions) {
+  CHECK_EQ(positions.size(), impl_->mesh.positions.size());
+  if (impl_->report.parts != 1 || impl_->triangles.size() != impl_->mesh.triangles.size()) return false;
+  // Others may hold what this one has been.
+  auto next = impl_.use_count() == 1 ? std::const_pointer_cast<Impl>(impl_) : std::make_shared<Impl>(*impl_);
+  next->follow(positions);
+  impl_ = std::move(next);
+  return true;
 }
 
 const TriMesh& CollisionMesh::mesh() const { return impl_->mesh; }

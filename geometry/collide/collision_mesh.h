@@ -77,6 +77,11 @@ class CollisionMesh {
   /// Inside a solid, not on its surface.
   bool inside(const Vec3& p) const;
 
+  /// Its vertices stand elsewhere now: positions [m], one for each of mesh()'s, in their order. The tree is refitted, nothing is welded, dropped
+  /// or turned anew: a solid that folds through itself, or a triangle that loses its area, is for the caller to avoid. Copies made before
+  /// keep what they had. False, and nothing done, where that is not enough: the mesh has several parts, or triangles without area.
+  bool follow(std::span<const Vec3> positions);
+
   /// As it is used: welded, without what was dropped, solids facing outward.
   const TriMesh& mesh() const;
   const Box3& bounds() const;

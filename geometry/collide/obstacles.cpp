@@ -6,6 +6,7 @@
 #include "geometry/base/check.h"
 #include "geometry/base/parallel.h"
 #include "geometry/base/zones.h"
+#include "geometry/collide/collision_mesh_internal.h"
 #include "geometry/collide/obstacles_internal.h"
 
 namespace effuse::geometry {
@@ -28,6 +29,33 @@ void Obstacles::move(std::size_t i, const RigidMotion& motion) {
   CHECK_LT(i, size());
   CHECK(impl_->all[i].has_value());
   impl_->all[i]->motion = motion;
+  impl_->changed.push_back(static_cast<Index>(i));
+}
+
+Vec3 Obstacle::velocity_at(Index triangle, const Vec3& point) const {
+  if (!deforms()) return motion.velocity_at(point, 1);
+  if (motion.duration() == 0) return Vec3::Zero();
+  const Triangle& t = shape.mesh().triangles[triangle];
+  const Vec3 w = triangle_weights(shape.impl().corners[triangle], point);
+  return w[0] * velocity[t[0]] + w[1] * velocity[t[1]] + w[2] * velocity[t[2]];
+}
+
+void Obstacles::deform(std::size_t i, std::span<const Vec3> positions, std::span<const Vec3> velocities, Real duration, std::span<const Triangle> triangles) {
+  CHECK_LT(i, size());
+  CHECK(impl_->all[i].has_value());
+  CHECK_EQ(velocities.size(), positions.size());
+  Obstacle& o = *impl_->all[i];
+  const auto anew = [&](std::span<const Triangle> faces) {
+    TriMesh mesh;
+    mesh.positions.assign(positions.begin(), positions.end());
+    mesh.triangles.assign(faces.begin(), faces.end());
+    o.shape = CollisionMesh(mesh);
+    CHECK_EQ(o.shape.mesh().positions.size(), positions.size());
+  };
+  if (!triangles.empty()) anew(triangles);
+  else if (!o.shape.follow(positions)) anew(std::vector<Triangle>(o.shape.mesh().triangles));
+  o.velocity.assign(velocities.begin(), velocities.end());
+  o.motion = RigidMotion({}, {}, duration);
   impl_->changed.push_back(static_cast<Index>(i));
 }
 
@@ -57,6 +85,7 @@ void Obstacles::update() {
     }
     place.now = placed_box(obstacle->motion.to(), obstacle->shape.bounds());
     place.swept = obstacle->motion.swept_box(obstacle->shape.bounds());
+    for (std::size_t v = 0; v < obstacle->velocity.size(); ++v) place.swept.extend(Vec3(obstacle->shape.mesh().positions[v] - obstacle->motion.duration() * obstacle->velocity[v]));
     impl_->boxes.set(i, place.swept);
   }
   impl_->changed.clear();
@@ -88,6 +117,12 @@ Box3 Obstacles::bounds() const {
 Box3 Obstacles::swept_bounds() const {
   CHECK(impl_->up_to_date());
   return impl_->swept;
+}
+
+Box3 Obstacles::swept_bounds(std::size_t i) const {
+  CHECK(impl_->up_to_date());
+  CHECK(holds(i));
+  return impl_->place[i].swept;
 }
 
 void Obstacles::meeting(const Box3& box, std::vector<Index>& out) const {
