@@ -70,7 +70,9 @@ class SpringsEffect final : public Effect {
   }
 
   std::string_view name() const override { return settings_.name; }
-  void meet(const std::vector<Effect*>& others) override { things_.meet(others); }
+  void meet(const std::vector<Effect*>& others) override {
+    if (settings_.meets) things_.meet(others);
+  }
   Real time() const override { return time_; }
 
   void step(Real t_end) override {
