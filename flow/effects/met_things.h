@@ -13,7 +13,8 @@ namespace effuse::flow {
 /// Obstacles of a scene, and its rigid bodies as another effect moves them, for an effect that meets them and moves none. Of a body that
 /// has broken it meets the pieces, each coming from where it was in the body; of lava its blocks of crust, each from the moment on at which
 /// the lava is first seen with it. An effect steps through a frame that the bodies' own has behind it, or before it: over that frame a body
-/// goes straight from where it was to where it is, turning at a constant rate.
+/// goes straight from where it was to where it is, turning at a constant rate. One that lava steps with itself (Effect::led_by) meets them
+/// standing, as they were when that step of the lava's began.
 class MetThings {
  public:
   /// All are where they are at time 0.

@@ -156,6 +156,15 @@ CollisionMesh::CollisionMesh(const TriMesh& mesh) {
 
 std::optional<CollisionMesh::Nearest> CollisionMesh::nearest(const Vec3& p, Real reach) const { return impl_->nearest(p, reach); }
 
+Vec3 CollisionMesh::weights(Index triangle, const Vec3& p) const {
+  const auto& [a, b, c] = impl_->corners[triangle];
+  const Vec3 u = b - a, v = c - a, w = p - a;
+  const Real uu = u.squaredNorm(), uv = u.dot(v), vv = v.squaredNorm(), wu = w.dot(u), wv = w.dot(v), d = uu * vv - uv * uv;
+  if (!(d > 0)) return Vec3::Constant(Real{1} / 3);
+  const Real second = (vv * wu - uv * wv) / d, third = (uu * wv - uv * wu) / d;
+  return {1 - second - third, second, third};
+}
+
 Real CollisionMesh::signed_distance(const Vec3& p, Real reach) const {
   const auto found = nearest(p, reach);
   return found ? found->distance : std::numeric_limits<Real>::infinity();

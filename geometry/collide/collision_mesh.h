@@ -72,6 +72,9 @@ class CollisionMesh {
   static constexpr Real kApart = 30 * kPi / 180;
   std::size_t surroundings(const Vec3& p, Real reach, std::span<Nearest> out) const;
 
+  /// Barycentric coordinates of a point of a triangle of mesh(); of another point those of the place in the triangle's plane below it.
+  Vec3 weights(Index triangle, const Vec3& p) const;
+
   /// Distance [m], negative inside a solid; +infinity when nothing is within reach.
   Real signed_distance(const Vec3& p, Real reach = std::numeric_limits<Real>::infinity()) const;
   /// Inside a solid, not on its surface.

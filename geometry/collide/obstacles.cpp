@@ -6,7 +6,6 @@
 #include "geometry/base/check.h"
 #include "geometry/base/parallel.h"
 #include "geometry/base/zones.h"
-#include "geometry/collide/collision_mesh_internal.h"
 #include "geometry/collide/obstacles_internal.h"
 
 namespace effuse::geometry {
@@ -36,7 +35,7 @@ Vec3 Obstacle::velocity_at(Index triangle, const Vec3& point) const {
   if (!deforms()) return motion.velocity_at(point, 1);
   if (motion.duration() == 0) return Vec3::Zero();
   const Triangle& t = shape.mesh().triangles[triangle];
-  const Vec3 w = triangle_weights(shape.impl().corners[triangle], point);
+  const Vec3 w = shape.weights(triangle, point);
   return w[0] * velocity[t[0]] + w[1] * velocity[t[1]] + w[2] * velocity[t[2]];
 }
 
@@ -52,8 +51,10 @@ void Obstacles::deform(std::size_t i, std::span<const Vec3> positions, std::span
     o.shape = CollisionMesh(mesh);
     CHECK_EQ(o.shape.mesh().positions.size(), positions.size());
   };
+  const std::vector<Vec3>& now = o.shape.mesh().positions;
+  const bool elsewhere = !std::equal(now.begin(), now.end(), positions.begin(), positions.end());
   if (!triangles.empty()) anew(triangles);
-  else if (!o.shape.follow(positions)) anew(std::vector<Triangle>(o.shape.mesh().triangles));
+  else if (elsewhere && !o.shape.follow(positions)) anew(std::vector<Triangle>(o.shape.mesh().triangles));
   o.velocity.assign(velocities.begin(), velocities.end());
   o.motion = RigidMotion({}, {}, duration);
   impl_->changed.push_back(static_cast<Index>(i));

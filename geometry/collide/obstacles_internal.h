@@ -28,15 +28,6 @@ struct Obstacles::Impl {
   bool up_to_date() const { return changed.empty(); }
 };
 
-/// Barycentric coordinates of a point of a triangle; of any other those of the nearest in the triangle's plane.
-inline Vec3 triangle_weights(const std::array<Vec3, 3>& corners, const Vec3& p) {
-  const Vec3 u = corners[1] - corners[0], v = corners[2] - corners[0], w = p - corners[0];
-  const Real uu = u.squaredNorm(), uv = u.dot(v), vv = v.squaredNorm(), wu = w.dot(u), wv = w.dot(v), d = uu * vv - uv * uv;
-  if (!(d > 0)) return Vec3::Constant(Real{1} / 3);
-  const Real b = (vv * wu - uv * wv) / d, c = (uu * wv - uv * wu) / d;
-  return {1 - b - c, b, c};
-}
-
 /// The nearest contacts of a point, as they come: by distance, then surface, then the obstacle's number. As many as out has room for, at
 /// most kMost; out is filled from the front, behind it nothing is touched.
 class NearestContacts {
