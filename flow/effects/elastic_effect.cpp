@@ -39,12 +39,14 @@ struct ElasticSettings {
   Vec3 velocity = Vec3::Zero(), spin = Vec3::Zero(), gravity = Vec3(0, 0, -kGravity);
   std::vector<Pin> pins;
   std::string pinned_to;
-  bool meets = true;
+  bool meets = true, meets_lava = true;
+  Real lava_friction = 1, temperature = 0;
+  Material heat;
   PenaltyResponse response;
   Real thickness = 0, step = kStep;
 };
 
-class ElasticEffect final : public Effect {
+class ElasticEffect final : public Effect, private Deformable {
  public:
   ElasticEffect(const ElasticSettings& settings, const World& world, ElasticShape shape)
       : settings_(settings), terrain_(world.terrain), shape_(std::move(shape)), solid_(shape_.tets, shape_.material), things_(settings.meets ? world : World{}) {
@@ -64,24 +66,23 @@ class ElasticEffect final : public Effect {
   }
 
   std::string_view name() const override { return settings_.form.name; }
-  void meet(const std::vector<Effect*>& others) override { things_.meet(others); }
+  void meet(const std::vector<Effect*>& others) override {
+    if (settings_.meets) things_.meet(others);
+  }
   Real time() const override { return time_; }
 
+  /// By itself, or with the lava that presses on it.
   void step(Real t_end) override {
-    ZONE("elastic.step");
-    const Real left = t_end - time_, count = std::max(1.0, std::ceil(left / settings_.step * (1 - 1e-9)));
-    Real dt = left / count;
-    const fem::SolidState before = solid_.state();
-    for (int halving = 0;; ++halving, dt /= 2) {
-      if (advance(dt)) break;
-      if (solid_.nodes() == before.x.size()) solid_.state() = before;
-      if (halving == kHalvings || solid_.nodes() != before.x.size())
-        throw UnstableError(fmt::format("elastic '{}' at {:.6g} s: the solve of a step does not end in numbers, even with steps of {:.3g} s; a shorter step, or a smaller contact_stiffness, would do", name(), time_, dt));
-      ++retries_;
-    }
-    time_ = count > 1 || dt < left ? time_ + dt : t_end;
-    ++steps_;
+    if (leader_) leader_->step(t_end);
+    else step_alone(t_end);
   }
+
+  SoftSolid soft() override {
+    if (!settings_.meets_lava) return {};
+    find_surface();
+    return {this, settings_.lava_friction, settings_.temperature, solid_.rest_volume(), settings_.heat};
+  }
+  void led_by(Effect& leader) override { leader_ = &leader; }
 
   std::vector<NamedMesh> meshes() const override {
     std::vector<NamedMesh> all;
@@ -89,9 +90,10 @@ class ElasticEffect final : public Effect {
     return all;
   }
 
-  std::size_t memory() const override { return solid_.memory() + shape_.memory() + 4 * solid_.nodes() * sizeof(Vec3); }
+  std::size_t memory() const override { return solid_.memory() + shape_.memory() + 4 * solid_.nodes() * sizeof(Vec3) + surface_.point.capacity() * 16 + surface_.triangles.capacity() * 12; }
   void add_to(StateHash& hash) const override {
     hash.add(time_);
+    if (!owed_.impulses().empty()) hash.add(std::span<const Vec3>(owed_.impulses()));
     solid_.add_to(hash);
   }
   void save(StateWriter& out) const override {
@@ -100,6 +102,7 @@ class ElasticEffect final : public Effect {
     out.value("retries", retries_);
     out.value("split", split_);
     out.value("unsolved", unsolved_);
+    if (leader_) out.array("owed", owed_.impulses());
     things_.save(out);
     solid_.save(out);
   }
@@ -109,8 +112,11 @@ class ElasticEffect final : public Effect {
     in.value("retries", retries_);
     in.value("split", split_);
     in.value("unsolved", unsolved_);
+    if (leader_) in.array("owed", owed_.impulses());
     things_.load(in);
     solid_.load_state(in);
+    if (!owed_.impulses().empty() && owed_.impulses().size() != solid_.nodes()) throw InputError(Place{"checkpoint"}, fmt::format("elastic '{}': impulses on {} nodes, wanted {}", name(), owed_.impulses().size(), solid_.nodes()));
+    if (settings_.material.strength > 0 && leader_) find_surface();
   }
   std::vector<std::pair<std::string, double>> figures() const override {
     Real kinetic = 0;
@@ -132,7 +138,76 @@ class ElasticEffect final : public Effect {
   }
 
  private:
-  bool advance(Real dt) {
+  // As lava has it.
+  std::span<const Vec3> places() const override { return solid_.state().x; }
+  std::span<const Vec3> velocities() const override { return solid_.state().v; }
+  std::span<const Real> masses() const override { return solid_.mass(); }
+  std::span<const std::uint8_t> held() const override { return solid_.held(); }
+  const HungSurface& surface() const override { return surface_; }
+  std::uint64_t surface_version() const override { return surface_version_; }
+  void predict(Real dt, std::vector<Vec3>& velocity, BlockMatrix& answer) override {
+    prepare(dt);
+    solid_.load = owed_.as_forces(dt);
+    solid_.predict(dt, velocity, answer);
+    solid_.load.clear();
+  }
+  void go(Real to, std::span<const Vec3> forces) override {
+    solid_.load = owed_.as_forces(to - time_, forces);
+    owed_.clear();
+    while (time_ < to) step_alone(to);
+    solid_.load.clear();
+    if (settings_.material.strength > 0) find_surface();
+  }
+  void push(Index node, const Vec3& impulse) override {
+    if (!solid_.held()[node]) owed_.add(node, impulse, solid_.nodes());
+  }
+
+  /// What lava meets: the mesh that shows it, or what its tetrahedra show. Of a brittle one faces come, and where a crack has just begun two
+  /// nodes are at one place: anew each time.
+  void find_surface() {
+    std::vector<Index> first = {0}, point;
+    std::vector<Real> weight;
+    std::vector<Vec3> places = solid_.state().x;
+    std::vector<geometry::Triangle> triangles = shape_.surface.triangles;
+    if (shape_.surface.positions.empty()) {
+      triangles = solid_.surface().triangles;
+      for (Index i = 0; i < places.size(); ++i) {
+        point.push_back(i);
+        first.push_back(static_cast<Index>(point.size()));
+      }
+      weight.assign(point.size(), 1);
+    } else {
+      places = shape_.surface.positions;
+      for (std::size_t q = 0; q < places.size(); ++q) {
+        for (std::size_t k = 0; k < 4; ++k) {
+          point.push_back(solid_.tets()[shape_.tet_of[q]][k]);
+          weight.push_back(shape_.weight[q][k]);
+        }
+        first.push_back(static_cast<Index>(point.size()));
+      }
+    }
+    surface_ = hang(places, triangles, first, point, weight);
+    ++surface_version_;
+  }
+
+  void step_alone(Real t_end) {
+    ZONE("elastic.step");
+    const Real left = t_end - time_, count = std::max(1.0, std::ceil(left / settings_.step * (1 - 1e-9)));
+    Real dt = left / count;
+    const fem::SolidState before = solid_.state();
+    for (int halving = 0;; ++halving, dt /= 2) {
+      if (advance(dt)) break;
+      if (solid_.nodes() == before.x.size()) solid_.state() = before;
+      if (halving == kHalvings || solid_.nodes() != before.x.size())
+        throw UnstableError(fmt::format("elastic '{}' at {:.6g} s: the solve of a step does not end in numbers, even with steps of {:.3g} s; a shorter step, or a smaller contact_stiffness, would do", name(), time_, dt));
+      ++retries_;
+    }
+    time_ = count > 1 || dt < left ? time_ + dt : t_end;
+    ++steps_;
+  }
+
+  /// Before a step of dt: where held nodes go, and what the others may touch.
+  void prepare(Real dt) {
     std::vector<Vec3>& v = solid_.state().v;
     const std::vector<Vec3>& x = solid_.state().x;
     if (driver_) {
@@ -142,6 +217,11 @@ class ElasticEffect final : public Effect {
         if (solid_.held()[i]) v[i] = (to.world(home.orientation.conjugate() * (start_[i] - home.position)) - x[i]) / dt;
     }
     if (settings_.meets) find_contacts(dt);
+  }
+
+  bool advance(Real dt) {
+    prepare(dt);
+    const std::vector<Vec3>&x = solid_.state().x, &v = solid_.state().v;
     const fem::StepReport report = solid_.step(dt);
     split_ += report.split;
     unsolved_ += report.converged ? 0 : 1;
@@ -167,6 +247,10 @@ class ElasticEffect final : public Effect {
   std::vector<Vec3> start_;
   MetThings things_;
   std::optional<geometry::PoseTrack> driver_;
+  Effect* leader_ = nullptr;  // lava that steps this with itself
+  HungSurface surface_;       // only where there is such
+  OwedImpulses owed_;
+  std::uint64_t surface_version_ = 0;
   Real time_ = 0, mass_ = 0;
   std::uint64_t steps_ = 0, retries_ = 0, split_ = 0, unsolved_ = 0;
 };
@@ -191,6 +275,10 @@ ElasticSettings read(Parameters& p) {
   s.pinned_to = p.text("pinned_to", "", "obstacle that carries the held points");
   s.gravity = read_vector(p, "gravity", "m/s2", s.gravity, "");
   s.meets = p.flag("meets_ground", true, "and obstacles");
+  s.meets_lava = p.flag("meets_lava", true, "(modern lava): each pushes the other; false: neither knows of the other");
+  s.lava_friction = p.number("lava_friction", "", s.lava_friction, {0, 1}, "of lava on it: 1 no slip, 0 free slip");
+  s.temperature = p.number("temperature", "K", s.temperature, {0, 5000}, "of its surface; 0: the ground's");
+  s.heat = read_material(p, m.density > 0 ? m.density : 1);
   const Real stiffness = 10 * m.youngs_modulus * s.spacing, mass = m.density * std::pow(s.spacing, 3) / 4;
   s.response.stiffness = p.number("contact_stiffness", "N/m", stiffness, Parameters::not_negative(), "of ground and obstacles, on each node; absent: ten times youngs_modulus times spacing");
   s.response.damping = p.number("contact_damping", "N s/m", 0.4 * std::sqrt(std::max(0.0, s.response.stiffness) * mass), Parameters::not_negative(), "of the same; absent: a fifth of what stops a node");

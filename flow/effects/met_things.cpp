@@ -29,18 +29,19 @@ MetThings::MetThings(const World& world) {
       std::iota(all.begin(), all.end(), Index{0});
       whole = geometry::surface_of(*each.cells, all);
     }
-    bodies_.push_back({body, body, add(each.cells ? whole : each.mesh, each.pose, body, body), each.pose, each.pose});
+    bodies_.push_back({body, body, add(each.cells ? whole : each.mesh, each.pose, body, each.temperature), each.pose, each.pose});
   }
 }
 
 /// Surfaces are numbered as SolidWorld has them, so that of two at equal distance the same one is met after loading.
-std::size_t MetThings::add(const geometry::TriMesh& mesh, const RigidPose& pose, Index id, Index body) {
-  return obstacles_.add({geometry::CollisionMesh(mesh), RigidMotion{pose, pose, 1}, temperature_[body], static_cast<Index>(tracks_.size() + 1 + id)});
+std::size_t MetThings::add(const geometry::TriMesh& mesh, const RigidPose& pose, Index id, Real temperature) {
+  return obstacles_.add({geometry::CollisionMesh(mesh), RigidMotion{pose, pose, 1}, temperature, static_cast<Index>(tracks_.size() + 1 + id)});
 }
 
 void MetThings::meet(const std::vector<Effect*>& others) {
   for (const Effect* other : others)
-    if (!bodies_.empty() && !mover_ && !other->body_poses().empty()) mover_ = other;
+    if (!mover_ && ((!bodies_.empty() && !other->body_poses().empty()) || other->makes_pieces())) mover_ = other;
+  blocks_ = mover_ && mover_->makes_pieces();
 }
 
 /// The bodies as their effect has them now, if it has moved on.
@@ -50,8 +51,7 @@ void MetThings::look() {
   to_time_ = mover_->time();
   const std::vector<RigidPose> poses = mover_->body_poses();
   std::vector<SolidPiece> pieces;
-  if (std::find(breaks_.begin(), breaks_.end(), 1) != breaks_.end()) pieces = mover_->pieces();
-  std::erase_if(pieces, [](const SolidPiece& each) { return each.body == SolidPiece::kNoBody; });
+  if (blocks_ || std::find(breaks_.begin(), breaks_.end(), 1) != breaks_.end()) pieces = mover_->pieces();
   std::sort(pieces.begin(), pieces.end(), [](const SolidPiece& a, const SolidPiece& b) { return a.id < b.id; });
 
   // Those that are still there, and those that broke.
@@ -59,7 +59,7 @@ void MetThings::look() {
   std::vector<std::uint8_t> known(pieces.size(), 0);
   for (Met& each : bodies_) {
     each.from = each.to;
-    if (!breaks_[each.body]) {
+    if (!may_go(each)) {
       each.to = poses[each.id];
       continue;
     }
@@ -76,7 +76,7 @@ void MetThings::look() {
     std::erase_if(bodies_, [&](const Met& each) { return each.id == gone.id; });
   }
 
-  // A new one has its body's frame: it was part of that which had it nearest to where it is.
+  // A new piece has its body's frame: it was part of that which had it nearest to where it is. A block comes where it is.
   for (std::size_t k = 0; k < pieces.size(); ++k) {
     if (known[k]) continue;
     const SolidPiece& piece = pieces[k];
@@ -87,9 +87,9 @@ void MetThings::look() {
     Real least = std::numeric_limits<Real>::infinity();
     for (const Met& gone : broken) {
       const Real way = (gone.from.world(middle) - piece.pose.world(middle)).norm();
-      if (gone.body == piece.body && way < least) least = way, from = gone.from;
+      if (gone.body == piece.body && piece.body != SolidPiece::kNoBody && way < least) least = way, from = gone.from;
     }
-    bodies_.push_back({piece.id, piece.body, add(*piece.mesh, piece.pose, piece.id, piece.body), from, piece.pose});
+    bodies_.push_back({piece.id, piece.body, add(*piece.mesh, piece.pose, piece.id, temperature_of(piece)), from, piece.pose});
   }
 }
 
@@ -99,11 +99,11 @@ void MetThings::find_meshes() {
   const std::vector<SolidPiece> pieces = mover_->pieces();
   for (Met& each : bodies_)
     for (const SolidPiece& piece : pieces)
-      if (each.obstacle == kNone && piece.id == each.id && piece.body == each.body) each.obstacle = add(*piece.mesh, each.to, each.id, each.body);
+      if (each.obstacle == kNone && piece.id == each.id && piece.body == each.body) each.obstacle = add(*piece.mesh, each.to, each.id, temperature_of(piece));
 }
 
 void MetThings::move(Real t, Real dt) {
-  if (tracks_.empty() && bodies_.empty()) return;
+  if (tracks_.empty() && bodies_.empty() && !blocks_) return;
   look();
   find_meshes();
   const Real way = dt > 0 ? dt : 1;
@@ -166,7 +166,7 @@ void MetThings::load(StateReader& in) {
     met.push_back({numbers[k], numbers[k + 1], kNone, pose(p), pose(p + 7)});
     const auto same = std::find_if(bodies_.begin(), bodies_.end(), [&](const Met& each) { return each.id == met.back().id; });
     if (same != bodies_.end()) std::swap(met.back().obstacle, same->obstacle);
-    fits = met.back().body < breaks_.size() && (breaks_[met.back().body] || same != bodies_.end());
+    fits = met.back().body == SolidPiece::kNoBody ? blocks_ : met.back().body < breaks_.size() && (breaks_[met.back().body] || same != bodies_.end());
   }
   if (!fits) throw InputError(Place{"bodies"}, "the checkpoint holds other bodies");
   for (const Met& each : bodies_)

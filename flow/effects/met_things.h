@@ -11,17 +11,20 @@
 namespace effuse::flow {
 
 /// Obstacles of a scene, and its rigid bodies as another effect moves them, for an effect that meets them and moves none. Of a body that
-/// has broken it meets the pieces, each coming from where it was in the body. Blocks of crust are not among them. An effect steps through a
-/// frame that the bodies' own has behind it, or before it: over that frame a body goes straight from where it was to where it is, turning
-/// at a constant rate.
+/// has broken it meets the pieces, each coming from where it was in the body; of lava its blocks of crust, each from the moment on at which
+/// the lava is first seen with it. An effect steps through a frame that the bodies' own has behind it, or before it: over that frame a body
+/// goes straight from where it was to where it is, turning at a constant rate. One that lava steps with itself (Effect::led_by) meets them
+/// standing, as they were when that step of the lava's began.
 class MetThings {
  public:
   /// All are where they are at time 0.
   explicit MetThings(const World& world);
-  /// Looks among the others for one that moves bodies; as Effect::meet(). Without one they stay.
+  /// Looks among the others for one that moves bodies, or may make blocks; as Effect::meet(). Without one they stay. Not to be called by an
+  /// effect that is to meet nothing.
   void meet(const std::vector<Effect*>& others);
 
-  bool empty() const { return obstacles_.empty(); }
+  /// There is nothing, nor will there be.
+  bool empty() const { return obstacles_.empty() && !blocks_; }
   const geometry::Obstacles& obstacles() const { return obstacles_; }
   /// They go from where they are at t [s] to where they are dt later, dt >= 0.
   void move(Real t, Real dt);
@@ -33,7 +36,7 @@ class MetThings {
   void load(StateReader& in);
 
  private:
-  /// A body of the scene, or a piece of one.
+  /// A body of the scene, a piece of one, or a block (body: SolidPiece::kNoBody).
   struct Met {
     Index id, body;        // as SolidPiece has them
     std::size_t obstacle;  // kNone: loaded, and its mesh not yet asked for
@@ -42,7 +45,9 @@ class MetThings {
   static constexpr std::size_t kNone = ~std::size_t{0};
   void look();
   void find_meshes();
-  std::size_t add(const geometry::TriMesh& mesh, const geometry::RigidPose& pose, Index id, Index body);
+  std::size_t add(const geometry::TriMesh& mesh, const geometry::RigidPose& pose, Index id, Real temperature);
+  Real temperature_of(const SolidPiece& piece) const { return piece.body == SolidPiece::kNoBody ? piece.temperature : temperature_[piece.body]; }
+  bool may_go(const Met& each) const { return each.body == SolidPiece::kNoBody || breaks_[each.body]; }
 
   geometry::Obstacles obstacles_;
   std::vector<geometry::PoseTrack> tracks_;  // of the scene's obstacles, which come first
@@ -50,6 +55,7 @@ class MetThings {
   std::vector<std::uint8_t> breaks_;  // of the scene's bodies
   std::vector<Real> temperature_;     // of those [K]
   const Effect* mover_ = nullptr;
+  bool blocks_ = false;  // it may make some
   Real from_time_ = 0, to_time_ = 0;  // [s]
   std::vector<geometry::Contact> found_;
 };

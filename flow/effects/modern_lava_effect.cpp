@@ -53,17 +53,22 @@ class ModernLavaEffect final : public Effect {
       const Real area = static_cast<Real>(vent.lattice(options.spacing).size()) * options.spacing * options.spacing;
       openings_.push_back({vent.start, vent.stop, options.courant * options.spacing * area / vent.rate, vent.lattice(options.spacing), (vent.from + vent.to) / 2});
     }
-    // Several of one name: the second is name_2.
-    for (const std::string& name : solids_->names()) {
-      const auto taken = std::count(solids_->names().begin(), solids_->names().begin() + static_cast<std::ptrdiff_t>(figure_names_.size()), name);
-      figure_names_.push_back(taken > 0 ? fmt::format("{}_{}", name, taken + 1) : name);
-    }
+    name_figures();
   }
 
   std::string_view name() const override { return "lava"; }
   Real time() const override { return lava_.time(); }
 
   void meet(const std::vector<Effect*>& others) override {
+    for (Effect* other : others)
+      if (const SoftSolid soft = other->soft(); soft.solid) {
+        solids_->add_soft(std::string(other->name()), soft);
+        other->led_by(*this);
+      }
+    if (solids_->softs() > 0) {
+      lava_.set_solids(solids_->solids());
+      name_figures();
+    }
     std::vector<const Water*> waters;
     for (const Effect* other : others)
       if (const Water* water = other->water(); water && water->boiling() > 0) waters.push_back(water);
@@ -212,6 +217,15 @@ class ModernLavaEffect final : public Effect {
   }
 
  private:
+  /// Several of one name: the second is name_2.
+  void name_figures() {
+    figure_names_.clear();
+    for (const std::string& name : solids_->names()) {
+      const auto taken = std::count(solids_->names().begin(), solids_->names().begin() + static_cast<std::ptrdiff_t>(figure_names_.size()), name);
+      figure_names_.push_back(taken > 0 ? fmt::format("{}_{}", name, taken + 1) : name);
+    }
+  }
+
   /// A vent's times, and the longest step while it is open [s].
   struct Mouth {
     Real start, stop, step;

@@ -58,7 +58,7 @@ class ParticlesEffect final : public Effect {
       : settings_(settings), terrain_(*world.terrain), seed_(world.seed), plans_(std::move(emitters)), things_(settings.meets ? world : World{}) {}
 
   void meet(const std::vector<Effect*>& others) override {
-    things_.meet(others);
+    if (settings_.meets) things_.meet(others);
     std::vector<Opening> openings;
     for (Effect* other : others) {
       if (other->flow().spacing > 0) lava_ = other;

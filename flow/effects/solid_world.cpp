@@ -150,7 +150,7 @@ void SolidWorld::stand(Real time, Real dt) {
     RigidPose next = now;
     next.position += dt * velocity(b);
     next.orientation = geometry::rotation_by(dt * bodies_->spin(ids_[b])) * now.orientation;
-    go(tracks_.size() + b, RigidMotion(now, next, dt).turned_back());
+    go(place(b), RigidMotion(now, next, dt).turned_back());
   }
   obstacles_.update();
 }
@@ -158,7 +158,7 @@ void SolidWorld::stand(Real time, Real dt) {
 void SolidWorld::move(Real from, Real to) {
   for (const Index i : moving_) go(i, tracks_[i].between(from, to));
   for (std::size_t b = 0; b < ids_.size(); ++b)
-    if (!gone(b)) go(tracks_.size() + b, RigidMotion(before_[b], bodies_->body_pose(ids_[b]), last_dt_));
+    if (!gone(b)) go(place(b), RigidMotion(before_[b], bodies_->body_pose(ids_[b]), last_dt_));
   obstacles_.update();
 }
 
@@ -168,7 +168,7 @@ void SolidWorld::tell(std::vector<Movable>& movable) const {
     const BodyId id = ids_[b];
     if (gone(b)) continue;
     Movable m;
-    m.surface = static_cast<Index>(tracks_.size() + b + 1);
+    m.surface = static_cast<Index>(place(b) + 1);
     m.centre = bodies_->centres()[id];
     m.inverse_mass = 1 / bodies_->mass(id);
     const Mat3 R = bodies_->orientations()[id].toRotationMatrix();
@@ -185,7 +185,7 @@ void SolidWorld::take(std::span<const Movable> movable, Real dt) {
   const std::size_t count = ids_.size();
   std::vector<Vec3> given(count, Vec3::Zero());
   for (const Movable& m : movable) {
-    const std::size_t b = m.surface - tracks_.size() - 1;
+    const std::size_t b = body_of(m.surface);
     CHECK_LT(b, count);
     const BodyId id = ids_[b];
     before_[b] = bodies_->body_pose(id);
@@ -263,9 +263,26 @@ void SolidWorld::archive(Self& self, Archive& io) {
   io.value("body_contacts", self.last_.contacts);
 }
 
+void SolidWorld::add_soft(const std::string& name, const SoftSolid& soft) {
+  CHECK(soft.solid && ids_.size() == of_scene_);
+  const HungSurface& surface = soft.solid->surface();
+  geometry::TriMesh mesh;
+  surface.gather(soft.solid->places(), mesh.positions);
+  mesh.triangles = surface.triangles;
+  // Behind those that are there: its surface's number is its place's, and one.
+  const std::size_t number = obstacles_.add({geometry::CollisionMesh(mesh), {}, soft.temperature, static_cast<Index>(obstacles_.size() + 1)});
+  CHECK_EQ(number, tracks_.size() + of_scene_ + soft_.size());
+  soft_.push_back({number, soft.solid});
+  names_.push_back(fmt::format("'{}'", name));
+  friction_.push_back(soft.friction);
+  add_heat(name, soft.material, soft.temperature, soft.volume);
+  obstacles_.update();
+}
+
 sph::SolidOptions SolidWorld::solids() {
   if (obstacles_.empty() && !has_bodies()) return {};
   sph::SolidOptions options{&obstacles_, {}, friction_};
+  options.deforming = soft_;
   if (has_bodies()) options.friction_by = [this](Index surface) { return surface < friction_.size() ? friction_[surface] : 1; };
   options.effusivity = effusivity_;
   options.heated = [this](std::span<const Real> heat, std::span<const Real> hottest) { warm(heat, hottest); };
@@ -277,7 +294,7 @@ sph::SolidOptions SolidWorld::solids() {
   options.movable = [this](std::vector<Movable>& movable) { tell(movable); };
   options.moved = [this](std::span<const Movable> movable, Real dt) { take(movable, dt); };
   options.push = [this](Index surface, const Vec3& impulse, const Vec3& at) {
-    if (surface > tracks_.size()) bodies_->add_impulse(ids_[surface - tracks_.size() - 1], impulse, at);
+    if (is_body(surface)) bodies_->add_impulse(ids_[body_of(surface)], impulse, at);
   };
   return options;
 }

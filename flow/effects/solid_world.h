@@ -28,8 +28,10 @@ bodies::BodyOptions body_options(const BodySettings& settings);
 /// A thing with a material of its own takes up heat as a half-space where lava touches it (sph::Heat), beginning from the temperature that
 /// the whole has by then: that rises by what it was given over its heat capacity, so that it never grows hotter than the lava. Of an
 /// obstacle that is no solid, or has no temperature of its own, it stays.
-/// Surfaces are numbered from 1: obstacles, then bodies, in their order, then pieces of those that break as they come. Numbers of
-/// bodies that are gone are not given again. Not to be moved while a lava refers to it.
+/// Solids that deform give way to lava in the same way, each point of theirs an unknown of both solves (sph::Pressed), and take their own
+/// step, as long, before the bodies'. They and bodies do not know one another here; they meet bodies as any effect does (MetThings).
+/// Surfaces are numbered from 1: obstacles, then bodies, in their order, then solids that deform, then pieces of those that break as they come.
+/// Numbers of bodies that are gone are not given again. Not to be moved while a lava refers to it.
 ///
 /// What lava does to a body that may break is spread over the places where particles lie on it (wet()) as one smooth field a + b x r whose
 /// force and moment are those of the solves, so that a wall bends under lava that stands against it.
@@ -48,6 +50,10 @@ class SolidWorld {
   Real block_mass() const;
   /// Takes out blocks whose centre is where `beyond` says; their mass [kg].
   Real drop_blocks(const std::function<bool(const Vec3&)>& beyond);
+
+  /// Solids that deform, before the first step: those of an effect with such (Effect::soft), called by its name. Lava's options say all.
+  void add_soft(const std::string& name, const SoftSolid& soft);
+  std::size_t softs() const { return soft_.size(); }
 
   /// For ModernLava; refers to this object. No obstacles of any kind: empty.
   sph::SolidOptions solids();
@@ -110,6 +116,10 @@ class SolidWorld {
   };
   bodies::BodyId add_block_body(const Block& block, const geometry::RigidPose& pose, const Vec3& velocity, const Vec3& spin);
   void admit_block(const Block& block);
+  /// Of a body or piece among the obstacles; its surface has the number behind. And back: of a body's surface.
+  std::size_t place(std::size_t body) const { return tracks_.size() + body + (body < of_scene_ ? 0 : soft_.size()); }
+  std::size_t body_of(Index surface) const { return surface - tracks_.size() - 1 - (surface > tracks_.size() + of_scene_ ? soft_.size() : 0); }
+  bool is_body(Index surface) const { return surface > tracks_.size() && !(surface > tracks_.size() + of_scene_ && surface <= tracks_.size() + of_scene_ + soft_.size()); }
   bool breaks(std::size_t body) const { return brittle_ && brittle_->knows(ids_[body]); }
   bool gone(std::size_t body) const { return bodies_->is_gone(ids_[body]); }
   template <class Self, class Archive>
@@ -118,7 +128,7 @@ class SolidWorld {
   void set_mean(std::size_t thing);
   void warm(std::span<const Real> heat, std::span<const Real> hottest);
 
-  std::vector<std::string> names_;       // obstacles', then bodies'
+  std::vector<std::string> names_;       // by surface: obstacles', bodies', solids' that deform, pieces'
   std::vector<geometry::PoseTrack> tracks_;
   std::vector<Index> moving_;            // obstacles whose tracks have several keys
   std::vector<bodies::BodyId> driven_;   // of each obstacle; only where there are bodies
@@ -145,6 +155,7 @@ class SolidWorld {
   std::unique_ptr<bodies::RigidBodies> bodies_;
   std::unique_ptr<bodies::BrittleBodies> brittle_;  // null: none may break
   std::vector<Block> blocks_;  // also those that are gone
+  std::vector<sph::SolidOptions::Deforming> soft_;
 };
 
 /// Of the obstacles, bodies and joints of a world, with its settings.

@@ -27,7 +27,7 @@ void SolidWorld::admit(BodyId id, Index parent) {
   look_.resize(ids_.size());
   look_.back() = std::make_shared<const geometry::TriMesh>(std::move(mesh));
   before_.push_back(bodies_->body_pose(id));
-  obstacles_.add({geometry::CollisionMesh(turned), RigidMotion(before_.back()), temperature_.at(parent), static_cast<Index>(tracks_.size() + ids_.size())});
+  obstacles_.add({geometry::CollisionMesh(turned), RigidMotion(before_.back()), temperature_.at(parent), static_cast<Index>(obstacles_.size() + 1)});
 }
 
 /// Takes in the pieces that have come and lets go of what they were.
@@ -54,14 +54,14 @@ void SolidWorld::admit_pieces() {
       look_.emplace_back();
       before_.push_back(bodies_->body_pose(id));
       const geometry::CollisionMesh mesh(geometry::surface_of(*brittle_->material(birth.source).cells, birth.cells));
-      obstacles_.remove(obstacles_.add({mesh, RigidMotion(before_.back()), 0, static_cast<Index>(tracks_.size() + ids_.size())}));
+      obstacles_.remove(obstacles_.add({mesh, RigidMotion(before_.back()), 0, static_cast<Index>(obstacles_.size() + 1)}));
     }
   }
   for (std::size_t b = 0; b < ids_.size(); ++b)
     if (gone(b) && look_[b]) {
       look_[b] = nullptr;
       wet_[b].clear();
-      obstacles_.remove(tracks_.size() + b);
+      obstacles_.remove(place(b));
     }
 }
 
@@ -95,7 +95,7 @@ void SolidWorld::admit_block(const Block& block) {
   turned = bodies_->shape(block.id).surface();
   look_.push_back(std::make_shared<const geometry::TriMesh>(std::move(look)));
   before_.push_back(bodies_->body_pose(block.id));
-  obstacles_.add({geometry::CollisionMesh(turned), RigidMotion(before_.back()), block.temperature, static_cast<Index>(tracks_.size() + ids_.size())});
+  obstacles_.add({geometry::CollisionMesh(turned), RigidMotion(before_.back()), block.temperature, static_cast<Index>(obstacles_.size() + 1)});
 }
 
 void SolidWorld::add_block(std::span<const Vec3> corners, Real mass, const RigidPose& pose, const Vec3& velocity, const Vec3& spin, Real temperature) {
@@ -138,7 +138,7 @@ void SolidWorld::wet(std::span<const Vec3> x, Real spacing) {
   for (std::vector<Vec3>& places : wet_) places.clear();
   Box3 near;
   for (std::size_t b = 0; b < ids_.size(); ++b)
-    if (breaks(b)) near.extend(geometry::placed_box(obstacles_[tracks_.size() + b].motion.to(), obstacles_[tracks_.size() + b].shape.bounds()));
+    if (breaks(b)) near.extend(geometry::placed_box(obstacles_[place(b)].motion.to(), obstacles_[place(b)].shape.bounds()));
   if (near.isEmpty()) return;
   near = Box3(near.min() - Vec3::Constant(spacing), near.max() + Vec3::Constant(spacing));
   std::vector<Vec3> asked;
@@ -148,8 +148,8 @@ void SolidWorld::wet(std::span<const Vec3> x, Real spacing) {
   std::vector<geometry::Contact> found(asked.size() * kMost);
   obstacles_.contacts(asked, spacing, kMost, found);
   for (const geometry::Contact& c : found) {
-    if (!c.any() || c.surface <= tracks_.size()) continue;
-    const std::size_t b = c.surface - tracks_.size() - 1;
+    if (!c.any() || !is_body(c.surface)) continue;
+    const std::size_t b = body_of(c.surface);
     if (breaks(b)) wet_[b].push_back(bodies_->pose(ids_[b]).body(c.point));
   }
 }

@@ -49,14 +49,15 @@ struct SpringsSettings {
   std::string pinned_to;
   springs::Surroundings around;
   geometry::ForceGrid field;
-  bool meets = true;
+  bool meets = true, meets_lava = true;
+  Real lava_friction = 1;
   Real thickness = 0;
   Scheme scheme = Scheme::kSymplecticEuler;
   Real step = 0;
   Vec3 color = Vec3::Constant(-1);
 };
 
-class SpringsEffect final : public Effect {
+class SpringsEffect final : public Effect, private Deformable {
  public:
   SpringsEffect(const SpringsSettings& settings, const World& world, SpringBody body)
       : settings_(settings), terrain_(world.terrain), body_(std::move(body)), state_(body_.state), things_(settings.meets ? world : World{}) {
@@ -70,10 +71,28 @@ class SpringsEffect final : public Effect {
   }
 
   std::string_view name() const override { return settings_.name; }
-  void meet(const std::vector<Effect*>& others) override { things_.meet(others); }
+  void meet(const std::vector<Effect*>& others) override {
+    if (settings_.meets) things_.meet(others);
+  }
   Real time() const override { return time_; }
 
+  /// By itself, or with the lava that presses on it.
   void step(Real t_end) override {
+    if (leader_) leader_->step(t_end);
+    else step_alone(t_end);
+  }
+
+  SoftSolid soft() override {
+    if (!settings_.meets_lava) return {};
+    find_surface();
+    SoftSolid soft;
+    soft.solid = this;
+    soft.friction = settings_.lava_friction;
+    return soft;
+  }
+  void led_by(Effect& leader) override { leader_ = &leader; }
+
+  void step_alone(Real t_end) {
     const Real left = t_end - time_, wanted = settings_.step > 0 ? settings_.step : own_step_;
     const Real count = std::max(1.0, std::ceil(left / wanted * (1 - 1e-9)));
     Real dt = left / count;
@@ -88,18 +107,18 @@ class SpringsEffect final : public Effect {
     }
     time_ = count > 1 || dt < left ? time_ + dt : t_end;
     ++steps_;
-    if (const std::size_t torn = tear_now(); torn > 0) make_system();
+    if (const std::size_t torn = tear_now(); torn > 0) {
+      const std::vector<Vec3> load = system_->surroundings.load;
+      make_system();
+      system_->surroundings.load = load;
+      if (leader_) find_surface();
+    }
   }
 
   std::vector<NamedMesh> meshes() const override {
     geometry::TriMesh mesh = body_.surface;
     mesh.positions = springs::surface_positions(body_, state_.x);
-    if (!torn_.empty())
-      std::erase_if(mesh.triangles, [&](const geometry::Triangle& t) {
-        for (std::size_t k = 0; k < 3; ++k)
-          if (std::binary_search(torn_.begin(), torn_.end(), pair_of(t[k], t[(k + 1) % 3]))) return true;
-        return false;
-      });
+    mesh.triangles = whole_triangles();
     geometry::compute_normals(mesh);
     mesh.attributes.clear();
     geometry::VertexAttribute& velocity = mesh.attributes["velocity"];
@@ -123,6 +142,7 @@ class SpringsEffect final : public Effect {
     hash.add(time_);
     hash.add(std::span<const Vec3>(state_.x));
     hash.add(std::span<const Vec3>(state_.v));
+    if (!owed_.impulses().empty()) hash.add(std::span<const Vec3>(owed_.impulses()));
     hash.add(body_.network.springs.size());
   }
   void save(StateWriter& out) const override {
@@ -132,6 +152,7 @@ class SpringsEffect final : public Effect {
     out.array("x", state_.x);
     out.array("v", state_.v);
     out.array("torn", torn_);
+    if (leader_) out.array("owed", owed_.impulses());
     things_.save(out);
   }
   void load(StateReader& in) override {
@@ -142,11 +163,14 @@ class SpringsEffect final : public Effect {
     in.array("x", state.x);
     in.array("v", state.v);
     in.array("torn", torn_);
+    if (leader_) in.array("owed", owed_.impulses());
     things_.load(in);
+    if (!owed_.impulses().empty() && owed_.impulses().size() != state_.x.size()) throw InputError(Place{"checkpoint"}, fmt::format("springs '{}': impulses on {} points, the scene's have {}", settings_.name, owed_.impulses().size(), state_.x.size()));
     if (state.x.size() != state_.x.size() || state.v.size() != state_.v.size()) throw InputError(Place{"checkpoint"}, fmt::format("springs '{}': holds {} points, the scene's have {}", settings_.name, state.x.size(), state_.x.size()));
     state_ = std::move(state);
     std::erase_if(body_.network.springs, [&](const springs::Spring& s) { return std::binary_search(torn_.begin(), torn_.end(), pair_of(s.a, s.b)); });
     make_system();
+    if (leader_) find_surface();
   }
   std::vector<std::pair<std::string, double>> figures() const override {
     return {{"points", static_cast<double>(state_.x.size())},
@@ -161,6 +185,57 @@ class SpringsEffect final : public Effect {
   std::string status() const override { return fmt::format("{} points, {} springs, dt {:.3g} s", state_.x.size(), body_.network.springs.size(), settings_.step > 0 ? settings_.step : own_step_); }
 
  private:
+  // As lava has it.
+  std::span<const Vec3> places() const override { return state_.x; }
+  std::span<const Vec3> velocities() const override { return state_.v; }
+  std::span<const Real> masses() const override { return body_.network.mass; }
+  std::span<const std::uint8_t> held() const override { return body_.network.held; }
+  const HungSurface& surface() const override { return surface_; }
+  std::uint64_t surface_version() const override { return surface_version_; }
+  void predict(Real dt, std::vector<Vec3>& velocity, BlockMatrix& answer) override {
+    prepare(dt);
+    system_->surroundings.load = owed_.as_forces(dt);
+    system_->predict(dt, state_, velocity, answer);
+    system_->surroundings.load.clear();
+  }
+  void go(Real to, std::span<const Vec3> forces) override {
+    system_->surroundings.load = owed_.as_forces(to - time_, forces);
+    owed_.clear();
+    while (time_ < to) step_alone(to);
+    system_->surroundings.load.clear();
+  }
+  void push(Index point, const Vec3& impulse) override {
+    if (!body_.network.held[point]) owed_.add(point, impulse, state_.x.size());
+  }
+
+  /// Those that no torn spring was a side of.
+  std::vector<geometry::Triangle> whole_triangles() const {
+    std::vector<geometry::Triangle> triangles = body_.surface.triangles;
+    if (!torn_.empty())
+      std::erase_if(triangles, [&](const geometry::Triangle& t) {
+        for (std::size_t k = 0; k < 3; ++k)
+          if (std::binary_search(torn_.begin(), torn_.end(), pair_of(t[k], t[(k + 1) % 3]))) return true;
+        return false;
+      });
+    return triangles;
+  }
+
+  /// What lava meets: the surface that shows it, a cloth's from both sides.
+  void find_surface() {
+    std::vector<Index> first = {0}, point;
+    std::vector<Real> weight;
+    for (std::size_t q = 0; q < body_.point.size(); ++q) {
+      for (std::size_t k = 0; k < body_.point[q].size(); ++k) {
+        if (body_.weight[q][k] == 0) continue;
+        point.push_back(body_.point[q][k]);
+        weight.push_back(body_.weight[q][k]);
+      }
+      first.push_back(static_cast<Index>(point.size()));
+    }
+    surface_ = hang(springs::surface_positions(body_, start_), whole_triangles(), first, point, weight);
+    ++surface_version_;
+  }
+
   /// Two points as one number, the same both ways round.
   static std::uint64_t pair_of(Index a, Index b) { return static_cast<std::uint64_t>(std::min(a, b)) << 32 | std::max(a, b); }
 
@@ -174,7 +249,8 @@ class SpringsEffect final : public Effect {
     own_step_ = settings_.scheme == Scheme::kImplicitEuler ? kImplicitStep : kSafety * limit_;
   }
 
-  bool advance(Real dt) {
+  /// Before a step of dt: where held points go, and what the others may touch.
+  void prepare(Real dt) {
     if (driver_) {
       // Held points go where the obstacle carries them, straight within a step.
       const geometry::RigidPose home = driver_->at(0), to = driver_->at(time_ + dt);
@@ -182,6 +258,10 @@ class SpringsEffect final : public Effect {
         if (body_.network.held[i]) state_.v[i] = (to.world(home.orientation.conjugate() * (start_[i] - home.position)) - state_.x[i]) / dt;
     }
     if (settings_.meets) find_contacts(dt);
+  }
+
+  bool advance(Real dt) {
+    prepare(dt);
     integrate_step(settings_.scheme, *system_, time_, dt, state_, storage_);
     return parallel_reduce(
         state_.x.size(), true, [&](std::size_t i) { return state_.x[i].allFinite() && state_.v[i].allFinite(); }, [](bool a, bool b) { return a && b; });
@@ -222,6 +302,10 @@ class SpringsEffect final : public Effect {
   MetThings things_;
   std::optional<geometry::PoseTrack> driver_;
   std::vector<std::uint64_t> torn_;
+  Effect* leader_ = nullptr;  // lava that steps this with itself
+  HungSurface surface_;       // only where there is such
+  OwedImpulses owed_;
+  std::uint64_t surface_version_ = 0;
   Real time_ = 0, limit_ = 0, own_step_ = 0, mean_rest_ = 0;
   std::uint64_t steps_ = 0, retries_ = 0;
 };
@@ -271,6 +355,8 @@ SpringsSettings read(Parameters& p) {
     else s.around.walls.push_back({Vec3(w[0], w[1], w[2]) / length, w[3] / length});
   }
   s.meets = p.flag("meets_ground", true, "and obstacles");
+  s.meets_lava = p.flag("meets_lava", true, "(modern lava): each pushes the other; false: neither knows of the other");
+  s.lava_friction = p.number("lava_friction", "", s.lava_friction, {0, 1}, "of lava on it: 1 no slip, 0 free slip");
   s.around.response.stiffness = p.number("contact_stiffness", "N/m", 2 * s.material.stiffness, Parameters::not_negative(), "of walls, ground and obstacles");
   s.around.response.damping = p.number("contact_damping", "N s/m", s.material.damping, Parameters::not_negative(), "of the same");
   s.around.response.friction = p.number("friction", "", 0.5, Parameters::not_negative(), "Coulomb's number of ground and obstacles; walls have none");

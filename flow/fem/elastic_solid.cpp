@@ -128,102 +128,142 @@ std::vector<Vec3> ElasticSolid::elastic_forces(std::span<const Vec3> x) const {
   return forces;
 }
 
-StepReport ElasticSolid::step(Real dt) {
-  ZONE("fem.step");
-  CHECK_GT(dt, 0);
-  const std::size_t n = nodes();
-  if (!load.empty()) CHECK_EQ(load.size(), n);
-  if (!newton_) {
-    std::vector<std::pair<Index, Index>> couplings;
-    for (const std::array<Index, 4>& t : tets_)
-      for (const auto& [a, b] : kPairs) couplings.emplace_back(t[a], t[b]);
-    newton_ = std::make_unique<BlockNewton>(n, couplings);
+/// The energy whose minimum is a step's end, with its derivatives.
+class ElasticSolid::StepEnergy {
+ public:
+  StepEnergy(const ElasticSolid& solid, Real dt)
+      : s_(solid), dt_(dt), start_(solid.state_.x), target_(solid.nodes()), turned_(solid.material_.damping > 0 ? solid.tets_.size() : 0), parts_(solid.tets_.size()), touch_(solid.contacts, solid.response, start_, solid.state_.v, dt) {
+    for (std::size_t i = 0; i < target_.size(); ++i) {
+      target_[i] = start_[i] + dt * s_.state_.v[i];
+      if (!s_.held_[i]) target_[i] += dt * dt * (s_.load.empty() ? s_.gravity : Vec3(s_.gravity + s_.load[i] / s_.mass_[i]));
+    }
+    // The damping's stiffness is that of the elements as they are turned at the step's start.
+    parallel_for(turned_.size(), [&](std::size_t e) { turned_[e] = rotation_of(s_.gradient(e, start_)); }, kGrain);
   }
-  const std::vector<Vec3> start = state_.x;
-  std::vector<Vec3> target(n), x(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    target[i] = start[i] + dt * state_.v[i];
-    if (!held_[i]) target[i] += dt * dt * (load.empty() ? gravity : Vec3(gravity + load[i] / mass_[i]));
-    x[i] = held_[i] ? target[i] : start[i];
-  }
-  // The damping's stiffness is that of the elements as they are turned at the step's start.
-  const bool damped = material_.damping > 0;
-  std::vector<Mat3> turned(damped ? tets_.size() : 0);
-  if (damped) parallel_for(tets_.size(), [&](std::size_t e) { turned[e] = rotation_of(gradient(e, start)); }, kGrain);
-  const ContactEnergy touch(contacts, response, start, state_.v, dt);
 
-  // Of an element about its turned rest: block (a, b) = volume R (mu (g_a . g_b) I + mu g_b g_a^T + lambda g_a g_b^T) R^T.
-  const auto block = [&](std::size_t e, const Mat3& R, std::size_t a, std::size_t b) -> Mat3 {
-    const Vec3 ga = R * elements_[e].slope[a], gb = R * elements_[e].slope[b];
-    return elements_[e].volume * (mu_ * ga.dot(gb) * Mat3::Identity() + mu_ * gb * ga.transpose() + lambda_ * ga * gb.transpose());
-  };
+  const std::vector<Vec3>& start() const { return start_; }
+  /// Held nodes where they go, others where they are.
+  std::vector<Vec3> first_guess() const {
+    std::vector<Vec3> x(start_);
+    for (std::size_t i = 0; i < x.size(); ++i)
+      if (s_.held_[i]) x[i] = target_[i];
+    return x;
+  }
+
+  Real value(const std::vector<Vec3>& at) const {
+    Real sum = s_.elastic_energy(at) + touch_.value(at);
+    sum += parallel_sum(at.size(), 0.0, [&](std::size_t i) { return s_.held_[i] ? 0.0 : s_.mass_[i] * (at[i] - target_[i]).squaredNorm() / (2 * dt_ * dt_); });
+    if (!turned_.empty())
+      sum += parallel_sum(turned_.size(), 0.0, [&](std::size_t e) {
+        const Mat3 strain = turned_[e].transpose() * moved(e, at), s = (strain + strain.transpose()) / 2;
+        return s_.material_.damping / dt_ * s_.elements_[e].volume * (s_.mu_ * s.squaredNorm() + s_.lambda_ / 2 * s.trace() * s.trace());
+      }, kGrain);
+    return sum;
+  }
+
+  void derivatives(const std::vector<Vec3>& at, BlockNewton::Sink& sink) {
+    const auto& tets = s_.tets_;
+    parallel_for(tets.size(), [&](std::size_t e) {
+      const Mat3 F = s_.gradient(e, at), R = rotation_of(F), P = 2 * s_.mu_ * (F - R) + s_.lambda_ * ((R.transpose() * F).trace() - 3) * R;
+      const Element& element = s_.elements_[e];
+      for (std::size_t a = 0; a < 4; ++a) {
+        parts_[e].gradient[a] = element.volume * P * element.slope[a];
+        parts_[e].diagonal[a] = block(e, R, a, a);
+      }
+      for (std::size_t p = 0; p < 6; ++p) parts_[e].coupling[p] = block(e, R, kPairs[p][0], kPairs[p][1]);
+      if (turned_.empty()) return;
+      const Real c = s_.material_.damping / dt_;
+      const Mat3 strain = turned_[e].transpose() * moved(e, at), stress = turned_[e] * (s_.mu_ * (strain + strain.transpose()) + s_.lambda_ * strain.trace() * Mat3::Identity());
+      for (std::size_t a = 0; a < 4; ++a) {
+        parts_[e].gradient[a] += c * element.volume * stress * element.slope[a];
+        parts_[e].diagonal[a] += c * block(e, turned_[e], a, a);
+      }
+      for (std::size_t p = 0; p < 6; ++p) parts_[e].coupling[p] += c * block(e, turned_[e], kPairs[p][0], kPairs[p][1]);
+    }, kGrain);
+    const std::vector<std::uint8_t>& held = s_.held_;
+    for (Index i = 0; i < at.size(); ++i) {
+      if (held[i]) {
+        sink.diagonal(i, Mat3::Identity());
+        continue;
+      }
+      sink.gradient(i, s_.mass_[i] / (dt_ * dt_) * (at[i] - target_[i]));
+      sink.diagonal(i, s_.mass_[i] / (dt_ * dt_) * Mat3::Identity());
+    }
+    for (std::size_t e = 0; e < tets.size(); ++e) {
+      for (std::size_t a = 0; a < 4; ++a) {
+        if (held[tets[e][a]]) continue;
+        sink.gradient(tets[e][a], parts_[e].gradient[a]);
+        sink.diagonal(tets[e][a], parts_[e].diagonal[a]);
+      }
+      for (std::size_t p = 0; p < 6; ++p)
+        if (!held[tets[e][kPairs[p][0]]] && !held[tets[e][kPairs[p][1]]]) sink.coupling(6 * e + p, parts_[e].coupling[p]);
+    }
+    touch_.derivatives(at, held, sink);
+  }
+
+ private:
   struct Parts {
     std::array<Vec3, 4> gradient;
     std::array<Mat3, 4> diagonal;
     std::array<Mat3, 6> coupling;
   };
-  std::vector<Parts> parts(tets_.size());
+  /// Gradient of what has moved since the start: R^T times it, its symmetric part is what the turned element calls strain.
+  Mat3 moved(std::size_t e, const std::vector<Vec3>& at) const {
+    Mat3 H = Mat3::Zero();
+    for (std::size_t a = 0; a < 4; ++a) H += (at[s_.tets_[e][a]] - start_[s_.tets_[e][a]]) * s_.elements_[e].slope[a].transpose();
+    return H;
+  }
+  /// Of an element about its turned rest: block (a, b) = volume R (mu (g_a . g_b) I + mu g_b g_a^T + lambda g_a g_b^T) R^T.
+  Mat3 block(std::size_t e, const Mat3& R, std::size_t a, std::size_t b) const {
+    const Vec3 ga = R * s_.elements_[e].slope[a], gb = R * s_.elements_[e].slope[b];
+    return s_.elements_[e].volume * (s_.mu_ * ga.dot(gb) * Mat3::Identity() + s_.mu_ * gb * ga.transpose() + s_.lambda_ * ga * gb.transpose());
+  }
 
-  const auto value = [&](const std::vector<Vec3>& at) {
-    Real sum = elastic_energy(at) + touch.value(at);
-    sum += parallel_sum(n, 0.0, [&](std::size_t i) { return held_[i] ? 0.0 : mass_[i] * (at[i] - target[i]).squaredNorm() / (2 * dt * dt); });
-    if (damped)
-      sum += parallel_sum(tets_.size(), 0.0, [&](std::size_t e) {
-        // R^T times the gradient of what has moved: its symmetric part is what the turned element calls strain.
-        Mat3 H = Mat3::Zero();
-        for (std::size_t a = 0; a < 4; ++a) H += (at[tets_[e][a]] - start[tets_[e][a]]) * elements_[e].slope[a].transpose();
-        const Mat3 strain = turned[e].transpose() * H, s = (strain + strain.transpose()) / 2;
-        return material_.damping / dt * elements_[e].volume * (mu_ * s.squaredNorm() + lambda_ / 2 * s.trace() * s.trace());
-      }, kGrain);
-    return sum;
-  };
-  const auto derivatives = [&](const std::vector<Vec3>& at, BlockNewton::Sink& sink) {
-    parallel_for(tets_.size(), [&](std::size_t e) {
-      const Mat3 F = gradient(e, at), R = rotation_of(F), P = 2 * mu_ * (F - R) + lambda_ * ((R.transpose() * F).trace() - 3) * R;
-      for (std::size_t a = 0; a < 4; ++a) {
-        parts[e].gradient[a] = elements_[e].volume * P * elements_[e].slope[a];
-        parts[e].diagonal[a] = block(e, R, a, a);
-      }
-      for (std::size_t p = 0; p < 6; ++p) parts[e].coupling[p] = block(e, R, kPairs[p][0], kPairs[p][1]);
-      if (!damped) return;
-      const Real c = material_.damping / dt;
-      Mat3 H = Mat3::Zero();
-      for (std::size_t a = 0; a < 4; ++a) H += (at[tets_[e][a]] - start[tets_[e][a]]) * elements_[e].slope[a].transpose();
-      const Mat3 strain = turned[e].transpose() * H, stress = turned[e] * (mu_ * (strain + strain.transpose()) + lambda_ * strain.trace() * Mat3::Identity());
-      for (std::size_t a = 0; a < 4; ++a) {
-        parts[e].gradient[a] += c * elements_[e].volume * stress * elements_[e].slope[a];
-        parts[e].diagonal[a] += c * block(e, turned[e], a, a);
-      }
-      for (std::size_t p = 0; p < 6; ++p) parts[e].coupling[p] += c * block(e, turned[e], kPairs[p][0], kPairs[p][1]);
-    }, kGrain);
-    for (Index i = 0; i < n; ++i) {
-      if (held_[i]) {
-        sink.diagonal(i, Mat3::Identity());
-        continue;
-      }
-      sink.gradient(i, mass_[i] / (dt * dt) * (at[i] - target[i]));
-      sink.diagonal(i, mass_[i] / (dt * dt) * Mat3::Identity());
-    }
-    for (std::size_t e = 0; e < tets_.size(); ++e) {
-      for (std::size_t a = 0; a < 4; ++a) {
-        if (held_[tets_[e][a]]) continue;
-        sink.gradient(tets_[e][a], parts[e].gradient[a]);
-        sink.diagonal(tets_[e][a], parts[e].diagonal[a]);
-      }
-      for (std::size_t p = 0; p < 6; ++p)
-        if (!held_[tets_[e][kPairs[p][0]]] && !held_[tets_[e][kPairs[p][1]]]) sink.coupling(6 * e + p, parts[e].coupling[p]);
-    }
-    touch.derivatives(at, held_, sink);
-  };
+  const ElasticSolid& s_;
+  Real dt_;
+  std::vector<Vec3> start_, target_;
+  std::vector<Mat3> turned_;
+  std::vector<Parts> parts_;
+  ContactEnergy touch_;
+};
 
+BlockNewton& ElasticSolid::newton() {
+  if (!newton_) {
+    std::vector<std::pair<Index, Index>> couplings;
+    for (const std::array<Index, 4>& t : tets_)
+      for (const auto& [a, b] : kPairs) couplings.emplace_back(t[a], t[b]);
+    newton_ = std::make_unique<BlockNewton>(nodes(), couplings);
+  }
+  return *newton_;
+}
+
+StepReport ElasticSolid::step(Real dt) {
+  ZONE("fem.step");
+  CHECK_GT(dt, 0);
+  if (!load.empty()) CHECK_EQ(load.size(), nodes());
+  StepEnergy energy(*this, dt);
+  std::vector<Vec3> x = energy.first_guess();
   const Real size = elements_.empty() ? 1 : std::cbrt(6 * rest_volume() / static_cast<Real>(elements_.size()));
-  const BlockNewton::Report report = newton_->minimise(x, value, derivatives, {100, 1e-8 * size});
-  for (std::size_t i = 0; i < n; ++i)
-    if (!held_[i]) state_.v[i] = (x[i] - start[i]) / dt;
+  const BlockNewton::Report report = newton().minimise(
+      x, [&](const std::vector<Vec3>& at) { return energy.value(at); }, [&](const std::vector<Vec3>& at, BlockNewton::Sink& sink) { energy.derivatives(at, sink); }, {100, 1e-8 * size});
+  for (std::size_t i = 0; i < x.size(); ++i)
+    if (!held_[i]) state_.v[i] = (x[i] - state_.x[i]) / dt;
   state_.x = std::move(x);
   StepReport outcome{report.iterations, report.converged, 0};
   if (material_.strength > 0) outcome.split = split();
   return outcome;
+}
+
+void ElasticSolid::predict(Real dt, std::vector<Vec3>& velocity, BlockMatrix& answer) {
+  ZONE("fem.predict");
+  CHECK_GT(dt, 0);
+  StepEnergy energy(*this, dt);
+  const std::vector<Vec3> from = energy.first_guess();
+  const std::vector<Vec3> gradient = newton().linearise(from, [&](const std::vector<Vec3>& at, BlockNewton::Sink& sink) { energy.derivatives(at, sink); }, dt * dt, answer);
+  // One move of Newton's method: -H^-1 g, with A = dt^2 H.
+  velocity.resize(nodes());
+  answer.solve(gradient, velocity);
+  for (std::size_t i = 0; i < velocity.size(); ++i) velocity[i] = held_[i] ? state_.v[i] : Vec3((from[i] - energy.start()[i]) / dt - dt * velocity[i]);
 }
 
 std::vector<Mat3> ElasticSolid::stresses() const {

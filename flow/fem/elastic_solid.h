@@ -67,6 +67,7 @@ class ElasticSolid {
   const std::vector<std::array<Index, 4>>& tets() const { return tets_; }
   /// 1: the node moves with its own velocity, whatever pulls.
   std::vector<std::uint8_t>& held() { return held_; }
+  const std::vector<std::uint8_t>& held() const { return held_; }
 
   Vec3 gravity = Vec3(0, 0, -kGravity);
   std::vector<PlaneContact> contacts;
@@ -74,6 +75,12 @@ class ElasticSolid {
   std::vector<Vec3> load;  ///< forces on the nodes [N]; empty: none
 
   StepReport step(Real dt);
+
+  /// The step of dt [s] that would follow, as Newton's method begins it: linearised about where the nodes are.
+  ///   velocity  out: what each node goes over dt [m/s]; of held ones their own
+  ///   answer    out: A = M + dt^2 K + dt C [kg], K of the turned elements and contacts, C of the dampers; impulses J [N s] through the step, on top
+  ///             of load, change those by A^-1 J. Held nodes stand alone in it
+  void predict(Real dt, std::vector<Vec3>& velocity, BlockMatrix& answer);
 
   /// Elastic energy [J], and forces on the nodes [N] at a state.
   Real elastic_energy(std::span<const Vec3> x) const;
@@ -97,6 +104,8 @@ class ElasticSolid {
     Real volume;                 ///< at rest
     std::array<Vec3, 4> slope;   ///< of the shape functions
   };
+  class StepEnergy;
+  BlockNewton& newton();
   void measure();
   std::size_t split();
   Mat3 gradient(std::size_t e, std::span<const Vec3> x) const;

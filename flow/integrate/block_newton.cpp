@@ -117,6 +117,14 @@ const std::vector<Vec3>& BlockNewton::moved(const std::vector<Vec3>& x, Real sha
 
 void BlockNewton::take(std::vector<Vec3>& x) { x.swap(impl_->trial); }
 
+std::vector<Vec3> BlockNewton::hand_over(Real factor, BlockMatrix& hessian) const {
+  hessian.assign(impl_->hessian, factor);
+  hessian.factor();
+  std::vector<Vec3> gradient(impl_->points);
+  for (std::size_t i = 0; i < gradient.size(); ++i) gradient[i] = impl_->gradient.segment<3>(static_cast<Eigen::Index>(3 * i));
+  return gradient;
+}
+
 std::size_t BlockNewton::memory() const {
   std::size_t bytes = static_cast<std::size_t>(impl_->hessian.nonZeros()) * 12 + (impl_->point_slot.capacity() + impl_->coupling_slot.capacity()) * 12 + impl_->points * 72;
   if (impl_->points <= kMostDirect) bytes += static_cast<std::size_t>(impl_->factor.matrixL().nestedExpression().nonZeros()) * 12;

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "flow/integrate/block_matrix.h"
 #include "geometry/base/types.h"
 
 namespace effuse::flow {
@@ -73,6 +74,15 @@ class BlockNewton {
     return report;
   }
 
+  /// Gradient and Hessian at x alone: Hessian into `hessian`, times factor and factored.
+  template <class Derivatives>
+  std::vector<Vec3> linearise(const std::vector<Vec3>& x, Derivatives&& derivatives, Real factor, BlockMatrix& hessian) {
+    clear();
+    Sink sink(*this);
+    derivatives(x, sink);
+    return hand_over(factor, hessian);
+  }
+
   std::size_t memory() const;
 
  private:
@@ -87,6 +97,7 @@ class BlockNewton {
   Move solve(Real& first_steepness);
   const std::vector<Vec3>& moved(const std::vector<Vec3>& x, Real share);
   void take(std::vector<Vec3>& x);
+  std::vector<Vec3> hand_over(Real factor, BlockMatrix& hessian) const;
 
   struct Impl;
   std::unique_ptr<Impl> impl_;

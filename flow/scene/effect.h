@@ -128,6 +128,9 @@ class Effect {
   virtual FlowView flow() const { return {}; }
   virtual std::vector<Opening> openings() const { return {}; }
   virtual const Water* water() const { return nullptr; }
+  virtual SoftSolid soft() { return {}; }
+  /// From now on another steps what soft() says: step() leaves it to step(), and time() is its own. Called by that one in its meet().
+  virtual void led_by(Effect& leader) { static_cast<void>(leader); }
   /// What it chose by itself, a line each: for `effuse check`.
   virtual std::vector<std::string> remarks() const { return {}; }
 

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "flow/integrate/deformable.h"
+#include "flow/scene/material.h"
 #include "geometry/base/error.h"
 #include "geometry/base/types.h"
 
@@ -40,6 +42,18 @@ class Water {
   virtual Real temperature() const = 0;  ///< [K]
   /// [W/(m^2 K)] of what boils on lava under it; 0: it does not cool lava.
   virtual Real boiling() const = 0;
+};
+
+/// A solid of an effect's that a flow may press on. A flow that does steps it with itself, and says so (Effect::led_by).
+///   solid        of the effect's; null: it has none
+///   friction     of lava on it: 1 no slip, 0 free slip
+///   temperature  of its surface [K]; 0: the ground's
+///   volume       [m^3]
+struct SoftSolid {
+  Deformable* solid = nullptr;
+  Real friction = 1;
+  Real temperature = 0, volume = 0;
+  Material material;
 };
 
 /// Another effect that a table names, or needs: looked for when all are read.

@@ -21,6 +21,7 @@ struct Wall {
   Real distance = 0;               ///< from the particle [m], negative inside; as the sums take it: bend_walls()
   Real reach = 0;                  ///< the distance itself [m]
   Index surface = 0;               ///< which solid
+  Index triangle = kNotMovable;    ///< of a solid that deforms, its triangle; then `movable` is the place in ParticleSystem::pressed
   Real curvature = 0;              ///< sum of both principal curvatures [1/m]; positive: convex ground
   Vec3 velocity = Vec3::Zero();    ///< of the surface [m/s]
   Real temperature = 0;            ///< [K]; 0: none of its own
@@ -29,9 +30,13 @@ struct Wall {
   Real across = kNothingAcross;    ///< to a wall face to face with it [m]: FilmFriction::channel(); only obstacles' walls know
   bool mirrors = false;            ///< the pressure goes on along it beyond it, as in a mirror: pressure.h
   Index movable = kNotMovable;     ///< place in ParticleSystem::movable; then `velocity` is not looked at
-  Vec3 arm = Vec3::Zero();         ///< from its centre to the wall's place [m]
+  Vec3 arm = Vec3::Zero();         ///< from its centre to the wall's place [m]; on a triangle: barycentric coordinates of that
   Real part = 1, share = 1;        ///< of its gamma and of its other values that are its own, where walls meet: trim_walls()
 };
+
+/// Whether it belongs to a body that lava moves, or to a solid that it deforms.
+inline bool gives_way(const Wall& wall) { return wall.movable != kNotMovable; }
+inline bool deforms(const Wall& wall) { return wall.triangle != kNotMovable; }
 
 /// The walls of every particle, one list after another.
 struct Walls {

@@ -25,13 +25,13 @@ constexpr Real kLeast = 0.2;      // of a moment: what neighbours say less of is
 
 bool beside_body(const ParticleSystem& s, std::size_t i) {
   const std::span<const Wall> walls = (*s.walls)[i];
-  return std::any_of(walls.begin(), walls.end(), [](const Wall& wall) { return wall.movable != kNotMovable; });
+  return std::any_of(walls.begin(), walls.end(), gives_way);
 }
 }  // namespace
 
 std::vector<Mat3> even_pressure_factors(const ParticleSystem& s, std::span<const Real> off) {
   CHECK_EQ(off.size(), s.size());
-  if (std::none_of(s.walls->walls.begin(), s.walls->walls.end(), [](const Wall& wall) { return wall.movable != kNotMovable; })) return {};
+  if (std::none_of(s.walls->walls.begin(), s.walls->walls.end(), gives_way)) return {};
   std::vector<Mat3> factors(s.size(), Mat3::Zero());
   with_kernel(s, [&](const auto& kernel, auto periodic) {
     parallel_for(s.size(), [&](std::size_t i) {
@@ -86,7 +86,7 @@ void even_out(const ParticleSystem& s, std::span<const Real> off, std::span<cons
   CHECK_EQ(off.size(), s.size());
   CHECK_EQ(v.size(), s.size());
   CHECK_EQ(shift.size(), s.size());
-  if (s.movable.empty()) return;
+  if (!s.any_gives_way()) return;
   ZONE("sph.even out");
   with_kernel(s, [&](const auto& kernel, auto periodic) {
     const Real V = s.volume(), h = kSmall * s.spacing;

@@ -230,6 +230,7 @@ struct ModernLava::Impl {
     s.fixed = fixed;
     s.pairs = &pairs;
     s.movable = solids.movable();
+    s.pressed = solids.pressed();
     s.density = o.density;
     return s;
   }
@@ -357,6 +358,7 @@ struct ModernLava::Impl {
     lmu.resize(m);
     scratch.assign(m, 0.0);
     const bool crusted = o.heat.on && o.crust_viscosity > 0;
+    const ParticleSystem particles = system();
     if (o.rheology.needs_strain_rate() || crusted) shear_rate_squared(system(), o.slip_length, lv, scratch);
     const std::span<const Real> T = heat.temperature(), crust_share = heat.crust_share();
     parallel_for(m, [&](std::size_t k) {
@@ -375,7 +377,7 @@ struct ModernLava::Impl {
       if (!o.rheology.needs_strain_rate()) return;
       for (Index w = walls.first[k]; w < walls.first[k + 1]; ++w) {
         Wall& wall = walls.walls[w];
-        const Vec3 slip = lv[k] - (wall.movable == kNotMovable ? wall.velocity : solids.movable()[wall.movable].velocity_at(wall.arm));
+        const Vec3 slip = lv[k] - particles.velocity_of(wall);
         const Real along = (slip - slip.dot(wall.normal) * wall.normal).norm();
         const Real steep = along / (std::max(wall.distance, kClearance * o.spacing) + o.slip_length);
         if (steep > shear) wall.friction *= (mu_k - o.rheology.viscosity(T[i], shear) + o.rheology.viscosity(T[i], (1 - kSteep) * shear + kSteep * steep)) / mu_k;
@@ -477,7 +479,8 @@ struct ModernLava::Impl {
         if (speed <= kWake * o.sleep_speed) continue;
         asleep[i] = 0;
         slow[i] = 0;
-      } else if (speed > o.sleep_speed || emitter.held(i)) {
+      } else if (speed > o.sleep_speed || emitter.held(i) || std::any_of(walls[k].begin(), walls[k].end(), deforms)) {
+        // Nor does lava sleep on what bears it by bending: asleep it would weigh nothing there.
         slow[i] = 0;
       } else if ((slow[i] += dt) >= o.sleep_delay) {
         asleep[i] = 1;
@@ -754,6 +757,7 @@ void ModernLava::add(std::span<const Vec3> x, std::span<const Vec3> v, std::span
 }
 
 void ModernLava::set_water(WaterSource water) { impl_->water = std::move(water); }
+void ModernLava::set_solids(const SolidOptions& solids) { impl_->solids = Solids(solids, kClearance * impl_->o.spacing, impl_->mass, impl_->film.widest()); }
 
 Real ModernLava::take(std::span<const Index> which) {
   Impl& m = *impl_;

@@ -124,6 +124,8 @@ class ModernLava {
 
   /// From the next step on; no part of what is saved.
   void set_water(WaterSource water);
+  /// Other solids in place of those it was made with, likewise.
+  void set_solids(const SolidOptions& solids);
 
   /// One step of at most dt_max [s] > 0. A step whose viscosity solve fails (stays above ten times the tolerance), whose result is not finite,
   /// or which moves a particle by more than half a spacing is undone and tried with half the size, eight times and down to min_step; then

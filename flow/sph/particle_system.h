@@ -7,6 +7,7 @@
 #include "flow/sph/boundary.h"
 #include "flow/sph/column_grid.h"
 #include "flow/sph/kernel.h"
+#include "flow/sph/pressed.h"
 #include "geometry/base/types.h"
 
 namespace effuse::flow::sph {
@@ -25,12 +26,17 @@ struct ParticleSystem {
   Vec2 period = Vec2::Zero();              ///< [m]; 0: not periodic
   std::span<const std::uint8_t> fixed;     ///< 1: its velocity is prescribed; empty: none
   std::span<Movable> movable;              ///< bodies that walls belong to; the solves change their velocities
-  Real density = 0;                        ///< [kg/m^3]; needed beside movable bodies only
+  std::span<Pressed> pressed;              ///< solids that deform, likewise
+  Real density = 0;                        ///< [kg/m^3]; needed beside what gives way only
   PairKernels* pairs = nullptr;            ///< built on this system, shared by all who sum over it; null: each builds its own
 
   std::size_t size() const { return x.size(); }
   Real volume() const { return spacing * spacing * spacing; }
-  Vec3 velocity_of(const Wall& wall) const { return wall.movable == kNotMovable ? wall.velocity : movable[wall.movable].velocity_at(wall.arm); }
+  Vec3 velocity_of(const Wall& wall) const {
+    if (!gives_way(wall)) return wall.velocity;
+    return deforms(wall) ? pressed[wall.movable].at(wall, pressed[wall.movable].vertices) : movable[wall.movable].velocity_at(wall.arm);
+  }
+  bool any_gives_way() const { return !movable.empty() || !pressed.empty(); }
   bool is_fixed(std::size_t i) const { return !fixed.empty() && fixed[i]; }
   /// x_i - x_j, of the nearest image.
   template <bool kPeriodic>

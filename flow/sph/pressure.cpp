@@ -140,22 +140,33 @@ void pressure_acceleration(const ParticleSystem& s, std::span<const Real> q, std
 }
 
 void push_movables(const ParticleSystem& s, std::span<const Real> q, std::span<const Vec3> a, Real dt) {
-  if (s.movable.empty()) return;
+  if (!s.any_gives_way()) return;
   CHECK_EQ(a.size(), s.size());
   const Real mass = s.density * s.volume();
+  std::vector<std::vector<Vec3>> impulses;  // on the vertices of solids that deform
+  for (const Pressed& solid : s.pressed) impulses.emplace_back(solid.vertices.size(), Vec3::Zero());
+  const auto give = [&](const Wall& wall, const Vec3& impulse) {
+    if (!gives_way(wall)) return;
+    if (deforms(wall)) s.pressed[wall.movable].share(wall, impulse, impulses[wall.movable]);
+    else s.movable[wall.movable].push(impulse, wall.arm);
+  };
   for (std::size_t i = 0; i < s.size(); ++i) {
-    if (s.is_fixed(i) || std::none_of((*s.walls)[i].begin(), (*s.walls)[i].end(), [](const Wall& wall) { return wall.movable != kNotMovable; })) continue;
+    if (s.is_fixed(i) || std::none_of((*s.walls)[i].begin(), (*s.walls)[i].end(), gives_way)) continue;
     Vec3 sum = a[i];
     const Mat3 P = mirrored(s, i);
     for (const Wall& wall : (*s.walls)[i]) {
       const Vec3 push = q[i] * push_of(s, wall, P);
       sum += push;
-      if (wall.movable != kNotMovable) s.movable[wall.movable].push(dt * mass * push, wall.arm);
+      give(wall, dt * mass * push);
     }
     const Vec3 extra = sum - P.inverse() * sum;  // (P - 1) of what the pairs gave
-    for_each_mirror(s, i, [&](const Wall& wall, Real weight) {
-      if (wall.movable != kNotMovable) s.movable[wall.movable].push(-dt * mass * weight * extra, wall.arm);
-    });
+    for_each_mirror(s, i, [&](const Wall& wall, Real weight) { give(wall, -dt * mass * weight * extra); });
+  }
+  std::vector<Vec3> points, vertices;
+  for (std::size_t b = 0; b < s.pressed.size(); ++b) {
+    if (!s.pressed[b].near) continue;
+    s.pressed[b].respond(impulses[b], points, vertices);
+    s.pressed[b].add(1, points, vertices);
   }
 }
 
@@ -204,14 +215,15 @@ void PressureSolver::prepare(const ParticleSystem& s) {
     if (any_mirrors((*s.walls)[i])) {
       Mirrored m{.particle = static_cast<Index>(i), .P = mirrored(s, i)};
       for_each_mirror(s, i, [&](const Wall& wall, Real weight) {
-        if (wall.movable == kNotMovable) m.wall += weight * wall.velocity;
+        if (!gives_way(wall)) m.wall += weight * wall.velocity;
       });
       mirrored_.push_back(m);
     }
 
   grips_.clear();
   answer_.resize(s.movable.size());
-  if (!s.movable.empty()) {
+  bends_.resize(s.pressed.size());
+  if (s.any_gives_way()) {
     std::size_t m = 0;
     for (Index i = 0; i < n; ++i) {
       while (m < mirrored_.size() && mirrored_[m].particle < i) ++m;
@@ -220,7 +232,7 @@ void PressureSolver::prepare(const ParticleSystem& s) {
       for (const Wall& wall : (*s.walls)[i]) sum += wall.mirrors ? s.boundary->at(wall).moment_t : 0;
       for (Index k = s.walls->first[i]; k < s.walls->first[i + 1]; ++k) {
         const Wall& wall = s.walls->walls[k];
-        if (wall.movable == kNotMovable || s.is_fixed(i)) continue;
+        if (!gives_way(wall) || s.is_fixed(i)) continue;
         grips_.push_back({i, k, here ? static_cast<Index>(m) : kNotMovable, here && wall.mirrors && sum > 0 ? s.boundary->at(wall).moment_t / sum : 0});
       }
     }
@@ -237,8 +249,15 @@ void PressureSolver::prepare(const ParticleSystem& s) {
       for (Index k = s.walls->first[i]; k < s.walls->first[i + 1]; ++k) {
         push_[k] = push_of(s, s.walls->walls[k], P);
         slope += push_[k];
-        if (s.walls->walls[k].movable != kNotMovable && !s.is_fixed(i)) {
+        if (gives_way(s.walls->walls[k]) && !s.is_fixed(i)) {
           const Wall& wall = s.walls->walls[k];
+          if (deforms(wall)) {
+            const Pressed& solid = s.pressed[wall.movable];
+            const geometry::Triangle& t = solid.triangles[wall.triangle];
+            const Real mobility = wall.arm.dot(Vec3(solid.mobility[t[0]], solid.mobility[t[1]], solid.mobility[t[2]]));
+            diagonal += s.density * s.volume() * mobility * push_[k].squaredNorm();
+            continue;
+          }
           const Movable& body = s.movable[wall.movable];
           const Vec3 turn = wall.arm.cross(push_[k]);
           diagonal += s.density * s.volume() * (body.inverse_mass * push_[k].squaredNorm() + turn.dot(body.inverse_inertia * turn));
@@ -278,19 +297,32 @@ void PressureSolver::accelerate(const ParticleSystem& s) {
   answer([&](const Grip& grip) { return static_cast<Real>(scale_[grip.particle] * p_[grip.particle]); }, s);
 }
 
-/// answer_: accelerations of bodies to the pressures of(grip).
+/// Of the place of a wall that gives way.
+Vec3 PressureSolver::answer_at(const Wall& wall, const ParticleSystem& s) const {
+  if (deforms(wall)) return s.pressed[wall.movable].at(wall, bends_[wall.movable].vertices);
+  return answer_[wall.movable].linear + answer_[wall.movable].angular.cross(wall.arm);
+}
+
+/// answer_, bends_: accelerations of what gives way to the pressures of(grip).
 template <class F>
 void PressureSolver::answer(F&& of, const ParticleSystem& s) {
-  if (answer_.empty()) return;
+  if (grips_.empty()) return;
   const Real mass = s.density * s.volume();
   std::fill(answer_.begin(), answer_.end(), Answer{});
+  for (std::size_t b = 0; b < bends_.size(); ++b) bends_[b].force.assign(s.pressed[b].vertices.size(), Vec3::Zero());
   for (const Grip& grip : grips_) {
     const Wall& wall = s.walls->walls[grip.wall];
     Vec3 force = mass * of(grip) * push_[grip.wall];
     if (grip.mirrored != kNotMovable) force -= mass * grip.weight * mirrored_[grip.mirrored].extra;
+    if (deforms(wall)) {
+      s.pressed[wall.movable].share(wall, force, bends_[wall.movable].force);
+      continue;
+    }
     answer_[wall.movable].linear += force;
     answer_[wall.movable].angular += wall.arm.cross(force);
   }
+  for (std::size_t b = 0; b < bends_.size(); ++b)
+    if (s.pressed[b].near) s.pressed[b].respond(bends_[b].force, bends_[b].points, bends_[b].vertices);
   for (std::size_t b = 0; b < answer_.size(); ++b) {
     answer_[b].linear *= s.movable[b].inverse_mass;
     answer_[b].angular = s.movable[b].inverse_inertia * answer_[b].angular;
@@ -308,7 +340,7 @@ PressureSolver::Sums PressureSolver::multiply(const ParticleSystem& s) {
   for (const Grip& grip : grips_)
     if (grip.mirrored != kNotMovable) {
       const Wall& wall = s.walls->walls[grip.wall];
-      mirrored_[grip.mirrored].body += grip.weight * (answer_[wall.movable].linear + answer_[wall.movable].angular.cross(wall.arm));
+      mirrored_[grip.mirrored].body += grip.weight * answer_at(wall, s);
     }
   for (Mirrored& m : mirrored_) {
     FloatPairs::Vector& a = a_[m.particle];
@@ -327,10 +359,7 @@ PressureSolver::Sums PressureSolver::multiply(const ParticleSystem& s) {
       while (m != mirrored_.end() && m->particle < i) ++m;
       const Eigen::Vector3f push = push_[k].cast<float>();
       Eigen::Vector3f a = m != mirrored_.end() && m->particle == i ? m->kept : Eigen::Vector3f(a_[i].x, a_[i].y, a_[i].z);
-      if (!answer_.empty() && s.walls->walls[k].movable != kNotMovable) {
-        const Wall& wall = s.walls->walls[k];
-        a -= (answer_[wall.movable].linear + answer_[wall.movable].angular.cross(wall.arm)).cast<float>();
-      }
+      if (!grips_.empty() && gives_way(s.walls->walls[k])) a -= answer_at(s.walls->walls[k], s).cast<float>();
       Ap[i] += push.x() * a.x() + push.y() * a.y() + push.z() * a.z();
     }
     for (std::size_t i = begin; i < end; ++i) Ap[i] *= -scale[i];
@@ -526,8 +555,10 @@ PressureResult PressureSolver::solve_prepared(const ParticleSystem& s, std::span
         v[i] -= dt * sum;
       }
     });
-    if (!answer_.empty()) {
+    if (!grips_.empty()) {
       answer([&](const Grip& grip) { return change_[grip.particle]; }, s);
+      for (std::size_t b = 0; b < bends_.size(); ++b)
+        if (s.pressed[b].near) s.pressed[b].add(dt, bends_[b].points, bends_[b].vertices);
       for (std::size_t b = 0; b < answer_.size(); ++b) {
         s.movable[b].velocity += dt * answer_[b].linear;
         s.movable[b].spin += dt * answer_[b].angular;

@@ -37,7 +37,8 @@ Mat3 mirrored(const ParticleSystem& system, std::size_t i);
 /// the transpose of D: pressure does the work that compression takes up, momentum is kept to rounding.
 void pressure_acceleration(const ParticleSystem& system, std::span<const Real> q, std::span<Vec3> out);
 
-/// What the pressures q push bodies (ParticleSystem::movable) in a time dt: on each the opposite of what its walls push the particles.
+/// What the pressures q push bodies and solids (ParticleSystem::movable, pressed) in a time dt: on each the opposite of what its walls push the
+/// particles.
 ///   a  pressure_acceleration() of q
 void push_movables(const ParticleSystem& system, std::span<const Real> q, std::span<const Vec3> a, Real dt);
 
@@ -61,7 +62,8 @@ struct PressureResult {
 /// (MPRGP: conjugate gradients on the particles off their bound). v must have been accelerated by q_old already.
 /// With rate = 0 the velocities are free of divergence; a negative rate takes density back that is too large.
 /// Bodies that lava moves (ParticleSystem::movable) give way to the pressures in the same solve, as their mass and inertia allow (to
-/// A comes the positive part that their walls share): light ones float on it as heavy ones press on it.
+/// A comes the positive part that their walls share): light ones float on it as heavy ones press on it. So do solids that deform
+/// (ParticleSystem::pressed), as the matrix of their own step allows, which is solved in each iteration.
 /// The same operators as DFSPH (Bender & Koschier 2015), conjugate gradients in place of Jacobi's iteration.
 ///
 /// The iterations run in single precision, on the change of q; what they find acts on v and q in double, and where it matters
@@ -120,6 +122,7 @@ class PressureSolver {
   void accelerate(const ParticleSystem& s);
   template <class F>
   void answer(F&& of, const ParticleSystem& s);
+  Vec3 answer_at(const Wall& wall, const ParticleSystem& s) const;
   Sums multiply(const ParticleSystem& s);
   Sums iterate(const ParticleSystem& s, Real dt, Real goal, int max_iterations, int& iterations);
 
@@ -131,6 +134,10 @@ class PressureSolver {
   std::vector<Mirrored> mirrored_;  // rising
   std::vector<Grip> grips_;
   std::vector<Answer> answer_;      // of bodies to a_
+  struct Bend {  // of a solid that deforms: forces, and accelerations of its points and vertices
+    std::vector<Vec3> force, points, vertices;
+  };
+  std::vector<Bend> bends_;
   std::vector<Vec3> flow_;          // P v, where some are
   std::vector<Real> change_;
   std::vector<Sums> partial_;

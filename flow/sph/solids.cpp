@@ -4,10 +4,13 @@
 #include <array>
 #include <cmath>
 
+#include <fmt/format.h>
+
 #include "flow/sph/particle_arrays.h"
 #include "flow/sph/wall_backing.h"
 #include "geometry/base/check.h"
 #include "geometry/base/parallel.h"
+#include "geometry/base/unstable_at.h"
 #include "geometry/base/zones.h"
 #include "geometry/collide/swept.h"
 
@@ -54,7 +57,7 @@ void find_near(const geometry::Obstacles& obstacles, std::size_t count, Real by,
     if (meeting.empty()) return;
     std::array<Box3, kFew> boxes;
     if (meeting.size() <= kFew)
-      for (std::size_t m = 0; m < meeting.size(); ++m) boxes[m] = widened(place(obstacles[meeting[m]]), by);
+      for (std::size_t m = 0; m < meeting.size(); ++m) boxes[m] = widened(place(meeting[m]), by);
     for (std::size_t k = begin; k < end; ++k)
       flags[k] = meeting.size() > kFew || std::any_of(boxes.begin(), boxes.begin() + static_cast<std::ptrdiff_t>(meeting.size()), [&](const Box3& b) { return b.intersects(box(k)); });
   });
@@ -67,20 +70,102 @@ Solids::Solids(const SolidOptions& options, Real radius, Real mass, Real widest)
   CHECK_GT(radius, 0.0);
   for (const Real f : options.friction) CHECK(f >= 0 && f <= 1);
   for (const Real b : options.effusivity) CHECK(std::isfinite(b) && b >= 0);
+  for (const SolidOptions::Deforming& each : options.deforming) {
+    CHECK(each.solid && options.obstacles && options.obstacles->holds(each.obstacle));
+    pressed_.emplace_back().solid = each.solid;
+    pressed_.back().surface = (*options.obstacles)[each.obstacle].surface;
+    drawn_.emplace_back().version = each.solid->surface_version();
+    each.solid->surface().gather(each.solid->places(), drawn_.back().vertices);
+    CHECK_EQ(drawn_.back().vertices.size(), (*options.obstacles)[each.obstacle].shape.mesh().positions.size());
+  }
 }
 
 void Solids::restart(Real dt) {
   movable_ = before_;
   for (Movable& body : movable_) body.velocity += dt * body.acceleration;
+  for (Pressed& solid : pressed_) {
+    if (!solid.near) continue;
+    if (predicted_ != dt) solid.solid->predict(dt, solid.free, solid.answer);
+    solid.velocity = solid.free;
+    solid.solid->surface().gather(solid.velocity, solid.vertices);
+  }
+  predicted_ = dt;
+}
+
+/// Of one that has been torn to its last triangle nothing is met any more; it still takes its steps.
+bool Solids::leave_gone(std::size_t k) {
+  const std::size_t number = options_.deforming[k].obstacle;
+  if (!pressed_[k].solid->surface().triangles.empty()) return false;
+  if (options_.obstacles->holds(number)) options_.obstacles->remove(number);
+  return true;
+}
+
+/// Where the solid stands, with the velocities that it has.
+void Solids::stand_pressed(std::size_t k, Real dt) {
+  Pressed& solid = pressed_[k];
+  Drawn& drawn = drawn_[k];
+  const HungSurface& surface = solid.solid->surface();
+  const std::span<const Vec3> v = solid.solid->velocities();
+  solid.velocity.assign(v.begin(), v.end());
+  surface.gather(solid.velocity, solid.vertices);
+  solid.near = false;
+  if (leave_gone(k)) return;
+  std::vector<Vec3> at;
+  surface.gather(solid.solid->places(), at);
+  const bool anew = drawn.version != solid.solid->surface_version();
+  options_.obstacles->deform(options_.deforming[k].obstacle, at, solid.vertices, dt, anew ? std::span<const geometry::Triangle>(surface.triangles) : std::span<const geometry::Triangle>());
+  drawn = {solid.solid->surface_version(), std::move(at)};
+  for (const Vec3& u : solid.vertices) fastest_ = std::max(fastest_, u.norm());
+}
+
+namespace {
+/// Turned inside out it would draw lava in.
+void check_volume(const geometry::Obstacle& obstacle, const HungSurface& surface, std::span<const Vec3> at, Real time) {
+  if (!obstacle.shape.solid()) return;
+  Real volume = 0;
+  Vec3 middle = Vec3::Zero();
+  for (const Vec3& x : at) middle += x / static_cast<Real>(at.size());
+  for (const auto& [a, b, c] : surface.triangles) volume += (at[a] - middle).dot((at[b] - middle).cross(at[c] - middle)) / 6;
+  if (!(volume > 0)) throw UnstableAt(fmt::format("at t = {:.6g} s lava has pressed flat a solid that deforms, around ({:.6g}, {:.6g}, {:.6g}); a stiffer one would do", time, middle.x(), middle.y(), middle.z()), middle);
+}
+}  // namespace
+
+/// The solid's own step, pressed by what the solves said, and its surface on its way.
+void Solids::go_pressed(std::size_t k, Real time, Real dt) {
+  Pressed& solid = pressed_[k];
+  Drawn& drawn = drawn_[k];
+  std::vector<Vec3> forces;
+  if (solid.near && predicted_ > 0) {
+    forces = solid.impulses();
+    for (Vec3& force : forces) force /= dt;
+  }
+  solid.solid->go(time + dt, forces);
+  if (leave_gone(k)) return;
+  const bool anew = drawn.version != solid.solid->surface_version();
+  const HungSurface& surface = solid.solid->surface();
+  std::vector<Vec3> at, way;
+  surface.gather(solid.solid->places(), at);
+  check_volume((*options_.obstacles)[options_.deforming[k].obstacle], surface, at, time + dt);
+  if (anew) {
+    // It has broken: what it was no longer tells how each vertex came.
+    surface.gather(solid.solid->velocities(), way);
+  } else {
+    way.resize(at.size());
+    for (std::size_t q = 0; q < at.size(); ++q) way[q] = (at[q] - drawn.vertices[q]) / dt;
+  }
+  options_.obstacles->deform(options_.deforming[k].obstacle, at, way, dt, anew ? std::span<const geometry::Triangle>(surface.triangles) : std::span<const geometry::Triangle>());
+  drawn = {solid.solid->surface_version(), std::move(at)};
 }
 
 void Solids::go(Real time, Real dt) {
+  for (std::size_t k = 0; k < pressed_.size(); ++k) go_pressed(k, time, dt);
   if (!movable_.empty() && options_.moved) {
     std::vector<Movable> moved = movable_;
     for (std::size_t b = 0; b < moved.size(); ++b) weigh(moved[b], 1 / heavier_[b]);
     options_.moved(moved, dt);
   }
   if (options_.move) options_.move(time, time + dt);
+  if (!pressed_.empty()) options_.obstacles->update();
 }
 
 void Solids::stand(Real time, Real dt) {
@@ -96,14 +181,17 @@ void Solids::stand(Real time, Real dt) {
     weigh(body, heavier_.back());
   }
   movable_ = before_;
-  if (!options_.move) return;
+  predicted_ = 0;
   geometry::Obstacles& all = *options_.obstacles;
+  for (std::size_t k = 0; k < pressed_.size(); ++k) stand_pressed(k, dt);
+  if (!pressed_.empty()) all.update();
+  if (!options_.move) return;
   if (options_.stand) {
     options_.stand(time, dt);
   } else {
     options_.move(time, time + dt);
     for (std::size_t i = 0; i < all.size(); ++i)
-      if (all.holds(i)) all.move(i, all[i].motion.turned_back());
+      if (all.holds(i) && !all[i].deforms()) all.move(i, all[i].motion.turned_back());
     all.update();
   }
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -120,7 +208,7 @@ void Solids::stand(Real time, Real dt) {
 void Solids::rest() {
   geometry::Obstacles& all = *options_.obstacles;
   for (std::size_t i = 0; i < all.size(); ++i)
-    if (all.holds(i) && all[i].motion.moves()) all.move(i, geometry::RigidMotion(all[i].motion.to()));
+    if (all.holds(i) && all[i].moves()) all.move(i, geometry::RigidMotion(all[i].motion.to()));
   all.update();
 }
 
@@ -148,7 +236,7 @@ void Solids::add_walls(std::span<const Vec3> x, Real reach, Walls& walls) {
   speed_ = 0;
   if (!any()) return;
   find_near(*options_.obstacles, x.size(), reach, [&](std::size_t k) { return Box3(x[k], x[k]); },
-            [](const geometry::Obstacle& o) { return geometry::placed_box(o.motion.to(), o.shape.bounds()); }, flags_, near_);
+            [&](Index o) { return geometry::placed_box((*options_.obstacles)[o].motion.to(), (*options_.obstacles)[o].shape.bounds()); }, flags_, near_);
   if (near_.empty()) return;
   const std::size_t n = near_.size();
   at_.resize(n);
@@ -179,17 +267,44 @@ void Solids::add_walls(std::span<const Vec3> x, Real reach, Walls& walls) {
       const Contact& contact = contacts_[q * kMost + c];
       const Real friction = backing_[q * kMost + c] * friction_of(contact.surface);
       const Index body = number_of(contact.surface);
-      merged_.walls[place++] = {.normal = contact.normal, .distance = contact.distance, .reach = contact.distance, .surface = contact.surface,
+      const auto solid = std::find_if(pressed_.begin(), pressed_.end(), [&](const Pressed& p) { return p.surface == contact.surface; });
+      const bool moves = body != kNotMovable, bends = solid != pressed_.end();
+      Vec3 arm = moves ? Vec3(contact.point - movable_[body].centre) : Vec3(Vec3::Zero());
+      const Index triangle = bends ? triangle_of(contact, arm) : kNotMovable;
+      if (bends) solid->near = true;
+      merged_.walls[place++] = {.normal = contact.normal, .distance = contact.distance, .reach = contact.distance, .surface = contact.surface, .triangle = triangle,
                                 .velocity = contact.surface_velocity, .temperature = contact.surface_temperature, .effusivity = effusivity_of(contact.surface), .friction = friction, .across = across_[q * kMost + c],
-                                .mirrors = true, .movable = body,
-                                .arm = body != kNotMovable ? Vec3(contact.point - movable_[body].centre) : Vec3::Zero()};
+                                .mirrors = true, .movable = bends ? static_cast<Index>(solid - pressed_.begin()) : body,
+                                .arm = arm};
       speed_ = std::max(speed_, contact.surface_velocity.norm());
     }
     ++q;
   }
   merged_.first.back() = place;
+  for (std::size_t k = 0; k < pressed_.size(); ++k)
+    if (pressed_[k].near) know(k);
   std::swap(walls.first, merged_.first);
   std::swap(walls.walls, merged_.walls);
+}
+
+/// What the solves ask of a solid that is near.
+void Solids::know(std::size_t k) {
+  Pressed& solid = pressed_[k];
+  const HungSurface& surface = solid.solid->surface();
+  solid.triangles = (*options_.obstacles)[options_.deforming[k].obstacle].shape.mesh().triangles;
+  solid.mobility.assign(surface.size(), 0);
+  for (std::size_t q = 0; q < surface.size(); ++q)
+    for (Index i = surface.first[q]; i < surface.first[q + 1]; ++i)
+      if (!solid.solid->held()[surface.point[i]]) solid.mobility[q] += surface.weight[i] * surface.weight[i] / solid.solid->masses()[surface.point[i]];
+}
+
+/// The triangle of the contact's place, and the place on it.
+Index Solids::triangle_of(const Contact& contact, Vec3& weights) const {
+  const auto each = std::find_if(pressed_.begin(), pressed_.end(), [&](const Pressed& p) { return p.surface == contact.surface; });
+  const geometry::CollisionMesh& shape = (*options_.obstacles)[options_.deforming[static_cast<std::size_t>(each - pressed_.begin())].obstacle].shape;
+  const Index triangle = shape.nearest(contact.point)->triangle;
+  weights = shape.weights(triangle, contact.point);
+  return triangle;
 }
 
 void Solids::part(std::span<const Vec3> x, const Walls& walls, Neighbors& neighbors) {
@@ -249,7 +364,7 @@ geometry::SlideReport Solids::slide(std::span<const Index> which, std::span<cons
   ZONE("sph.solids");
   if (!any()) return {};
   find_near(*options_.obstacles, which.size(), 2 * radius_, [&](std::size_t k) { return Box3(before[which[k]].cwiseMin(x[which[k]]), before[which[k]].cwiseMax(x[which[k]])); },
-            [](const geometry::Obstacle& o) { return o.motion.swept_box(o.shape.bounds()); }, flags_, near_);
+            [&](Index o) { return options_.obstacles->swept_bounds(o); }, flags_, near_);
   if (near_.empty()) return {};
   if (wanted) wanted->assign(x.begin(), x.end());
   for (Index& k : near_) k = which[k];
@@ -263,15 +378,31 @@ geometry::SlideReport Solids::slide(std::span<const Index> which, std::span<cons
   met_.assign(n, 0);
   const geometry::SlideReport report = geometry::slide_all(*options_.obstacles, at_, way_, speed_at_, std::span(&radius_, 1), {}, met_);
   for (std::size_t q = 0; q < n; ++q) {
-    if (met_[q] != 0 && options_.push && speed_at_[q] != v[near_[q]]) {
-      const Index body = number_of(met_[q]);  // none: an obstacle, or a piece that came in this step
-      const Real heavier = body != kNotMovable ? heavier_[body] : 1;
-      options_.push(met_[q], mass_ / heavier * (v[near_[q]] - speed_at_[q]), heavier > 1 ? before_[body].centre : at_[q]);
-    }
+    if (met_[q] != 0 && speed_at_[q] != v[near_[q]]) push(met_[q], mass_ * (v[near_[q]] - speed_at_[q]), at_[q]);
     x[near_[q]] = at_[q];
     v[near_[q]] = speed_at_[q];
   }
   return report;
+}
+
+/// What a particle stopped at a place has given a surface.
+void Solids::push(Index surface, const Vec3& impulse, const Vec3& at) {
+  const auto each = std::find_if(pressed_.begin(), pressed_.end(), [&](const Pressed& p) { return p.surface == surface; });
+  if (each == pressed_.end()) {
+    if (!options_.push) return;
+    const Index body = number_of(surface);  // none: an obstacle, or a piece that came in this step
+    const Real heavier = body != kNotMovable ? heavier_[body] : 1;
+    options_.push(surface, impulse / heavier, heavier > 1 ? before_[body].centre : at);
+    return;
+  }
+  const geometry::CollisionMesh& shape = (*options_.obstacles)[options_.deforming[static_cast<std::size_t>(each - pressed_.begin())].obstacle].shape;
+  const auto place = shape.nearest(at);
+  const Vec3 weights = shape.weights(place->triangle, place->point);
+  const HungSurface& hung = each->solid->surface();
+  for (int k = 0; k < 3; ++k) {
+    const Index q = shape.mesh().triangles[place->triangle][static_cast<std::size_t>(k)];
+    for (Index i = hung.first[q]; i < hung.first[q + 1]; ++i) each->solid->push(hung.point[i], weights[k] * hung.weight[i] * impulse);
+  }
 }
 
 void Solids::warm(std::span<const Index> touches, std::span<const Real> given, std::span<const Real> temperature) {

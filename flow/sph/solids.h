@@ -9,6 +9,7 @@
 #include "flow/sph/boundary.h"
 #include "flow/sph/column_grid.h"
 #include "flow/sph/movable.h"
+#include "flow/sph/pressed.h"
 #include "geometry/collide/obstacles.h"
 #include "geometry/collide/slide.h"
 
@@ -30,7 +31,14 @@ namespace effuse::flow::sph {
 ///   heated     what each surface has been given in a step [J], and the hottest it was where lava touched it [K], 0 where none did; by
 ///              surface number, the ground's (0) and those without an effusivity of their own among them
 ///   push       an impulse [N s] that particles stopped by a body's surface have given it, at a place [m], after the step
+///   deforming  those among them that lava deforms, which it moves and steps itself: not owned, as above
 struct SolidOptions {
+  /// Its place among the obstacles; what it hangs on. Its surface there has the vertices of solid->surface().
+  struct Deforming {
+    std::size_t obstacle = 0;
+    Deformable* solid = nullptr;
+  };
+
   geometry::Obstacles* obstacles = nullptr;
   std::function<void(Real from, Real to)> move;
   std::vector<Real> friction;
@@ -41,6 +49,7 @@ struct SolidOptions {
   std::function<Real(Index surface)> friction_by = {};
   std::vector<Real> effusivity = {};
   std::function<void(std::span<const Real> heat, std::span<const Real> hottest)> heated = {};
+  std::vector<Deforming> deforming = {};
 };
 
 /// The lava's side of its obstacles: walls for the sums, and moves that go through nothing.
@@ -73,7 +82,7 @@ class Solids {
   /// face that are looked for [m].
   Solids(const SolidOptions& options, Real radius, Real mass, Real widest);
 
-  bool any() const { return options_.obstacles != nullptr && !options_.obstacles->empty(); }
+  bool any() const { return options_.obstacles != nullptr && (!options_.obstacles->empty() || !pressed_.empty()); }
 
   /// Obstacles stand where they are at `time` and have the velocities of their way to time + dt.
   void stand(Real time, Real dt);
@@ -81,6 +90,8 @@ class Solids {
   std::span<Movable> movable() { return movable_; }
   void begin_try() { movable_ = before_; }
   void restart(Real dt);
+  /// Solids that deform: as the solves have them, from restart() on; before it, as they are.
+  std::span<Pressed> pressed() { return pressed_; }
 
   /// Obstacles go from time to time + dt; bodies with the velocities they have been given.
   void go(Real time, Real dt);
@@ -117,6 +128,12 @@ class Solids {
   Real effusivity_of(Index surface) const { return surface < options_.effusivity.size() ? options_.effusivity[surface] : 0; }
   Index number_of(Index surface) const { return surface < number_.size() ? number_[surface] : kNotMovable; }
   void look_behind(std::span<const Vec3> x, Real reach, const Walls& ground);
+  void stand_pressed(std::size_t k, Real dt);
+  void go_pressed(std::size_t k, Real time, Real dt);
+  bool leave_gone(std::size_t k);
+  Index triangle_of(const geometry::Contact& contact, Vec3& weights) const;
+  void know(std::size_t k);
+  void push(Index surface, const Vec3& impulse, const Vec3& at);
 
   SolidOptions options_;
   Real radius_, mass_, widest_;
@@ -124,6 +141,13 @@ class Solids {
   std::vector<Movable> movable_, before_;
   std::vector<Real> heavier_;  // these bodies' masses are so many times their own
   std::vector<Index> number_;  // of the body among them with a surface
+  std::vector<Pressed> pressed_;  // as options_.deforming
+  struct Drawn {                  // of each, as it stands among the obstacles
+    std::uint64_t version = 0;
+    std::vector<Vec3> vertices;
+  };
+  std::vector<Drawn> drawn_;
+  Real predicted_ = 0;  // the step that pressed_ answers for [s]; 0: none yet
   std::vector<Index> near_, met_;
   std::vector<Vec3> at_, way_, speed_at_;
   std::vector<geometry::Contact> contacts_;

@@ -111,7 +111,7 @@ ViscosityResult ViscositySolver::solve(const ParticleSystem& s, Real density, st
   // Bodies: six velocities each, after the particles'. Their rows, divided by a particle's mass:
   //   B V + sum_walls J^T D (J V - v_i) = B V0,   B their mass and inertia, J V the velocity of a wall's place.
   const std::size_t bodies = s.movable.size();
-  const Real per_mass = bodies > 0 ? 1 / (s.density * s.volume()) : 0;
+  const Real per_mass = s.any_gives_way() ? 1 / (s.density * s.volume()) : 0;
   body_.resize(bodies);
   for (std::size_t b = 0; b < bodies; ++b) {
     const Movable& m = s.movable[b];
@@ -124,9 +124,10 @@ ViscosityResult ViscositySolver::solve(const ParticleSystem& s, Real density, st
     body.block = body.matrix;
   }
   grips_.clear();
-  for (Index i = 0; i < n && bodies > 0; ++i)
+  soft_grips_.clear();
+  for (Index i = 0; i < n && s.any_gives_way(); ++i)
     for (Index k = s.walls->first[i]; k < s.walls->first[i + 1]; ++k)
-      if (s.walls->walls[k].movable != kNotMovable) grips_.push_back({i, k});
+      if (gives_way(s.walls->walls[k])) (deforms(s.walls->walls[k]) ? soft_grips_ : grips_).push_back({i, k});
   // f(matrix of the wall's drag, its arm, body, particle) for all walls of bodies.
   const auto for_each_grip = [&](auto&& f) {
     for (const Grip& grip : grips_) {
@@ -135,6 +136,40 @@ ViscosityResult ViscositySolver::solve(const ParticleSystem& s, Real density, st
       f(Mat3(drag_[grip.wall].along * (Mat3::Identity() - across) + drag_[grip.wall].across * across), wall.arm, body_[wall.movable], grip.particle);
     }
   };
+
+  // Solids that deform: their points' velocities, with the matrix of their own step over a particle's mass in place of B.
+  soft_.resize(s.pressed.size());
+  const auto drag_of = [&](const Grip& grip) {
+    const Vec3& normal = s.walls->walls[grip.wall].normal;
+    const Mat3 across = normal * normal.transpose();
+    return Mat3(drag_[grip.wall].along * (Mat3::Identity() - across) + drag_[grip.wall].across * across);
+  };
+  const auto for_each_soft = [&](auto&& f) {
+    for (std::size_t b = 0; b < soft_.size(); ++b)
+      if (s.pressed[b].near) f(soft_[b], s.pressed[b]);
+  };
+  const auto leave_held = [](const Pressed& solid, std::span<Vec3> of_points) {
+    const std::span<const std::uint8_t> held = solid.solid->held();
+    for (std::size_t i = 0; i < held.size(); ++i)
+      if (held[i]) of_points[i].setZero();
+  };
+  const auto dot = [](std::span<const Vec3> a, std::span<const Vec3> b) {
+    Real sum = 0;
+    for (std::size_t i = 0; i < a.size(); ++i) sum += a[i].dot(b[i]);
+    return sum;
+  };
+  // Points that are held drag by what they go, which is known: in v and the first residual only.
+  for_each_soft([&](Soft& soft, const Pressed& solid) {
+    soft.matrix.assign(solid.answer, per_mass);
+    soft.v = solid.velocity;
+    soft.p = soft.v;
+    leave_held(solid, soft.p);
+    soft.r.resize(soft.v.size());
+    soft.matrix.multiply(soft.p, soft.r);
+    leave_held(solid, soft.r);
+    soft.Ap.resize(soft.v.size());
+    soft.z.resize(soft.v.size());
+  });
 
   // f(begin, end) returns a range's share of two sums.
   partial_.resize((n + kGrain - 1) / kGrain);
@@ -161,7 +196,7 @@ ViscosityResult ViscositySolver::solve(const ParticleSystem& s, Real density, st
         const Mat3 across = wall.normal * wall.normal.transpose();
         const Mat3 matrix = drag_[k].along * (Mat3::Identity() - across) + drag_[k].across * across;
         m += matrix;
-        if (wall.movable == kNotMovable) b += matrix * wall.velocity;
+        if (!gives_way(wall)) b += matrix * wall.velocity;
       }
       inverse_[i] = Factor(m);
       r_[i] = b;
@@ -182,9 +217,45 @@ ViscosityResult ViscositySolver::solve(const ParticleSystem& s, Real density, st
     b2 += {body.r.dot(body.inverse * body.r), body.r.head<3>().squaredNorm()};
   }
 
-  // out = A in; returns in . out. Of bodies: from Body::*from to Body::Ap.
-  const auto multiply = [&](std::span<const Vec3> in, std::span<Vec3> out, Vec6 Body::*from) {
+  for_each_soft([&](Soft& soft, const Pressed& solid) {
+    soft.block.assign(soft.matrix, 1);
+    const HungSurface& surface = solid.solid->surface();
+    std::vector<Mat3> lumped(surface.size(), Mat3::Zero());
+    for (const Grip& grip : soft_grips_) {
+      const Wall& wall = s.walls->walls[grip.wall];
+      if (&s.pressed[wall.movable] != &solid) continue;
+      for (std::size_t k = 0; k < 3; ++k) lumped[solid.triangles[wall.triangle][k]] += std::abs(wall.arm[static_cast<int>(k)]) * drag_of(grip);
+    }
+    for (std::size_t q = 0; q < lumped.size(); ++q) {
+      if (lumped[q].isZero(0)) continue;
+      for (Index k = surface.first[q]; k < surface.first[q + 1]; ++k) soft.block.add_diagonal(surface.point[k], std::abs(surface.weight[k]) * lumped[q]);
+    }
+    soft.block.factor();
+    soft.block.solve(soft.r, soft.z);
+    b2 += {dot(soft.r, soft.z), dot(soft.r, soft.r)};
+  });
+
+  // out = A in; returns in . out. Of bodies: from Body::*from to Body::Ap, of solids likewise.
+  const auto multiply = [&](std::span<const Vec3> in, std::span<Vec3> out, Vec6 Body::*from, std::vector<Vec3> Soft::*of_soft) {
     Sums of_bodies;
+    for_each_soft([&](Soft& soft, const Pressed& solid) {
+      solid.solid->surface().gather(soft.*of_soft, soft.vertices);
+      soft.pulls.assign(soft.vertices.size(), Vec3::Zero());
+      soft.z = soft.*of_soft;
+      leave_held(solid, soft.z);
+      soft.matrix.multiply(soft.z, soft.Ap);
+    });
+    for (const Grip& grip : soft_grips_) {
+      const Wall& wall = s.walls->walls[grip.wall];
+      const Pressed& solid = s.pressed[wall.movable];
+      Soft& soft = soft_[wall.movable];
+      solid.share(wall, drag_of(grip) * (solid.at(wall, soft.vertices) - in[grip.particle]), soft.pulls);
+    }
+    for_each_soft([&](Soft& soft, const Pressed& solid) {
+      solid.solid->surface().scatter(soft.pulls, soft.Ap);
+      leave_held(solid, soft.Ap);
+      of_bodies.preconditioned += dot(soft.*of_soft, soft.Ap);
+    });
     for (Body& body : body_) body.Ap = body.matrix * (body.*from);
     for_each_grip([&](const Mat3& D, const Vec3& arm, Body& body, Index i) {
       const Vec6& V = body.*from;
@@ -205,7 +276,9 @@ ViscosityResult ViscositySolver::solve(const ParticleSystem& s, Real density, st
         for (Index k = s.walls->first[i]; k < s.walls->first[i + 1]; ++k) {
           const Wall& wall = s.walls->walls[k];
           Vec3 slip = in[i];
-          if (wall.movable != kNotMovable) {
+          if (deforms(wall)) {
+            slip -= s.pressed[wall.movable].at(wall, soft_[wall.movable].vertices);
+          } else if (gives_way(wall)) {
             const Vec6& V = body_[wall.movable].*from;
             slip -= V.head<3>() + V.tail<3>().cross(wall.arm);
           }
@@ -220,7 +293,7 @@ ViscosityResult ViscositySolver::solve(const ParticleSystem& s, Real density, st
     return all += of_bodies;
   };
 
-  multiply(v, Ap_, &Body::v);
+  multiply(v, Ap_, &Body::v, &Soft::v);
   Sums rr = sum_of([&](std::size_t begin, std::size_t end) {
     Sums sum;
     for (std::size_t i = begin; i < end; ++i) {
@@ -235,6 +308,11 @@ ViscosityResult ViscositySolver::solve(const ParticleSystem& s, Real density, st
     body.p = body.inverse * body.r;
     rr += {body.r.dot(body.p), body.r.head<3>().squaredNorm()};
   }
+  for_each_soft([&](Soft& soft, const Pressed&) {
+    for (std::size_t i = 0; i < soft.r.size(); ++i) soft.r[i] -= soft.Ap[i];
+    soft.block.solve(soft.r, soft.p);
+    rr += {dot(soft.r, soft.p), dot(soft.r, soft.r)};
+  });
   // Where fixed particles alone drive the others, they are in the first residual only.
   if (b2.plain == 0) b2 = rr;
   const Real most = scale * scale * static_cast<Real>(n);
@@ -242,7 +320,7 @@ ViscosityResult ViscositySolver::solve(const ParticleSystem& s, Real density, st
   const Real goal = tolerance * tolerance;
   const auto reached = [&] { return rr.preconditioned <= goal * b2.preconditioned && rr.plain <= goal * b2.plain; };
   while (!reached() && result.iterations < max_iterations) {
-    const Real pAp = multiply(p_, Ap_, &Body::p).preconditioned;
+    const Real pAp = multiply(p_, Ap_, &Body::p, &Soft::p).preconditioned;
     if (!(pAp > 0)) break;  // not a number, or rounding has the last word
     const Real alpha = rr.preconditioned / pAp;
     Sums next = sum_of([&](std::size_t begin, std::size_t end) {
@@ -260,29 +338,58 @@ ViscosityResult ViscositySolver::solve(const ParticleSystem& s, Real density, st
       body.r -= alpha * body.Ap;
       next += {body.r.dot(body.inverse * body.r), body.r.head<3>().squaredNorm()};
     }
+    for_each_soft([&](Soft& soft, const Pressed&) {
+      for (std::size_t i = 0; i < soft.r.size(); ++i) {
+        soft.v[i] += alpha * soft.p[i];
+        soft.r[i] -= alpha * soft.Ap[i];
+      }
+      soft.block.solve(soft.r, soft.z);
+      next += {dot(soft.r, soft.z), dot(soft.r, soft.r)};
+    });
     const Real beta = next.preconditioned / rr.preconditioned;
     rr = next;
     parallel_for(n, [&](std::size_t i) { p_[i] = Ap_[i] + beta * p_[i]; }, 2048);
     for (Body& body : body_) body.p = body.inverse * body.r + beta * body.p;
+    for_each_soft([&](Soft& soft, const Pressed&) {
+      for (std::size_t i = 0; i < soft.p.size(); ++i) soft.p[i] = soft.z[i] + beta * soft.p[i];
+    });
     ++result.iterations;
   }
-  // Beside bodies, what momentum went astray, the sum of r, is given back by a step along that direction, the same for all: where nothing
-  // is held, A leaves such a step as it is, and the sum is then zero to rounding.
+  // Beside what gives way, the momentum that went astray, the sum of r, is given back by a step along that direction, the same for all:
+  // where nothing is held, A leaves such a step as it is, and the sum is then zero to rounding.
+  bool beside = bodies > 0;
+  for_each_soft([&](Soft&, const Pressed&) { beside = true; });
   Vec3 astray = Vec3::Zero();
-  for (Index i = 0; i < n && bodies > 0; ++i) astray += r_[i];
+  for (Index i = 0; i < n && beside; ++i) astray += r_[i];
   for (const Body& body : body_) astray += body.r.head<3>();
+  for_each_soft([&](Soft& soft, const Pressed&) {
+    for (const Vec3& r : soft.r) astray += r;
+  });
   if (astray.squaredNorm() > 0) {
     parallel_for(n, [&](std::size_t i) { p_[i] = s.is_fixed(i) ? Vec3(Vec3::Zero()) : astray; }, 2048);
     for (Body& body : body_) body.p << astray, Vec3::Zero();
-    if (const Real pAp = multiply(p_, Ap_, &Body::p).preconditioned; pAp > 0) {
+    for_each_soft([&](Soft& soft, const Pressed& solid) {
+      std::fill(soft.p.begin(), soft.p.end(), astray);
+      leave_held(solid, soft.p);
+    });
+    if (const Real pAp = multiply(p_, Ap_, &Body::p, &Soft::p).preconditioned; pAp > 0) {
       const Real alpha = astray.squaredNorm() / pAp;
       parallel_for(n, [&](std::size_t i) { v[i] += alpha * p_[i]; }, 2048);
       for (Body& body : body_) body.v += alpha * body.p;
+      for_each_soft([&](Soft& soft, const Pressed&) {
+        for (std::size_t i = 0; i < soft.v.size(); ++i) soft.v[i] += alpha * soft.p[i];
+      });
     }
   }
   for (std::size_t b = 0; b < bodies; ++b) {
     s.movable[b].velocity = body_[b].v.head<3>();
     s.movable[b].spin = body_[b].v.tail<3>();
+  }
+  for (std::size_t b = 0; b < soft_.size(); ++b) {
+    Pressed& solid = s.pressed[b];
+    if (!solid.near) continue;
+    solid.velocity = soft_[b].v;
+    solid.solid->surface().gather(solid.velocity, solid.vertices);
   }
   result.residual = b2.plain > 0 ? std::sqrt(std::max(rr.preconditioned / b2.preconditioned, rr.plain / b2.plain)) : 0;
   result.converged = reached();

@@ -34,8 +34,9 @@ struct ViscosityResult {
 };
 
 /// Bodies that lava moves (ParticleSystem::movable) are solved for together with it: their velocities at the step's end drag, and are
-/// dragged by, the particles beside them, so that any stiffness and lightness does. Where no wall but theirs holds the lava, momentum of
-/// both together is then kept to rounding, whatever the tolerance.
+/// dragged by, the particles beside them, so that any stiffness and lightness does. So are the points of solids that deform
+/// (ParticleSystem::pressed). Where no wall but theirs holds the lava, momentum of all together is then kept to rounding, whatever the
+/// tolerance.
 ///
 /// Solves  v - dt a(v) = v0  for the velocities at the step's end by conjugate gradients, matrix-free, with the
 /// inverse 3x3 diagonal blocks as preconditioner. Unconditionally stable.
@@ -75,11 +76,18 @@ class ViscositySolver {
     Mat6 matrix, block, inverse;  // B; with the drag of its walls; the inverse of that
     Vec6 v, r, p, Ap;             // velocity and spin; as the particles' arrays
   };
+  /// A solid that deforms: as Body, of its points; D shared out among them lumps in the preconditioner.
+  struct Soft {
+    BlockMatrix matrix, block;
+    std::vector<Vec3> v, r, p, Ap, z;    // by point; held ones stand apart: r, p, z are 0 there
+    std::vector<Vec3> vertices, pulls;   // by vertex, of a product
+  };
+  std::vector<Soft> soft_;
   struct Grip {
     Index particle, wall;
   };
   std::vector<Body> body_;
-  std::vector<Grip> grips_;  // walls of bodies
+  std::vector<Grip> grips_, soft_grips_;  // walls of bodies, of solids that deform
   std::vector<Vec3> r_, p_, Ap_;
   std::vector<Factor> inverse_;
   std::vector<Drag> drag_;

@@ -111,31 +111,54 @@ class StepEnergy {
 
 }  // namespace
 
-void SpringSystem::implicit_euler(Real, Real dt, SpringState& y) {
-  ZONE("springs.implicit");
-  const SpringNetwork& n = *impl_->network;
+ImplicitSolve& SpringSystem::Impl::begin(const Surroundings& around, Real dt, const SpringState& y) {
+  const SpringNetwork& n = *network;
   CHECK_EQ(y.x.size(), n.size());
   CHECK_EQ(y.v.size(), n.size());
-  if (!impl_->implicit) {
+  if (!around.load.empty()) CHECK_EQ(around.load.size(), n.size());
+  if (!implicit) {
     std::vector<std::pair<Index, Index>> couplings;
     for (const Spring& spring : n.springs) couplings.emplace_back(spring.a, spring.b);
-    impl_->implicit = std::make_unique<ImplicitSolve>(ImplicitSolve{BlockNewton(n.size(), couplings), {}, {}, {}, {}});
+    implicit = std::make_unique<ImplicitSolve>(ImplicitSolve{BlockNewton(n.size(), couplings), {}, {}, {}, {}});
   }
-  ImplicitSolve& s = *impl_->implicit;
+  ImplicitSolve& s = *implicit;
   s.start = y.x;
   s.target.resize(n.size());
   for (std::size_t i = 0; i < n.size(); ++i) {
-    Vec3 push = surroundings.gravity;
-    if (surroundings.field) push += surroundings.field->at(y.x[i]) / n.mass[i];
+    Vec3 push = around.gravity;
+    if (around.field) push += around.field->at(y.x[i]) / n.mass[i];
+    if (!around.load.empty()) push += around.load[i] / n.mass[i];
     s.target[i] = y.x[i] + dt * y.v[i] + (n.held[i] ? Vec3(Vec3::Zero()) : Vec3(dt * dt * push));
-    if (n.held[i]) y.x[i] = s.target[i];
   }
+  return s;
+}
+
+void SpringSystem::implicit_euler(Real, Real dt, SpringState& y) {
+  ZONE("springs.implicit");
+  const SpringNetwork& n = *impl_->network;
+  ImplicitSolve& s = impl_->begin(surroundings, dt, y);
+  for (std::size_t i = 0; i < n.size(); ++i)
+    if (n.held[i]) y.x[i] = s.target[i];
   const StepEnergy energy(n, surroundings, dt, s, {s.start, y.v});
   s.report = s.newton.minimise(
       y.x, [&](const std::vector<Vec3>& x) { return energy.value(x); }, [&](const std::vector<Vec3>& x, BlockNewton::Sink& sink) { energy.derivatives(x, sink); },
       {implicit.max_iterations, implicit.tolerance * (impl_->mean_rest > 0 ? impl_->mean_rest : 1)});
   for (std::size_t i = 0; i < n.size(); ++i)
     if (!n.held[i]) y.v[i] = (y.x[i] - s.start[i]) / dt;
+}
+
+void SpringSystem::predict(Real dt, const SpringState& y, std::vector<Vec3>& velocity, BlockMatrix& answer) {
+  ZONE("springs.predict");
+  const SpringNetwork& n = *impl_->network;
+  ImplicitSolve& s = impl_->begin(surroundings, dt, y);
+  std::vector<Vec3> from = y.x;
+  for (std::size_t i = 0; i < n.size(); ++i)
+    if (n.held[i]) from[i] = s.target[i];
+  const StepEnergy energy(n, surroundings, dt, s, {s.start, y.v});
+  const std::vector<Vec3> gradient = s.newton.linearise(from, [&](const std::vector<Vec3>& x, BlockNewton::Sink& sink) { energy.derivatives(x, sink); }, dt * dt, answer);
+  velocity.resize(n.size());
+  answer.solve(gradient, velocity);
+  for (std::size_t i = 0; i < n.size(); ++i) velocity[i] = n.held[i] ? y.v[i] : Vec3(-dt * velocity[i]);
 }
 
 BlockNewton::Report SpringSystem::implicit_report() const { return impl_->implicit ? impl_->implicit->report : BlockNewton::Report{}; }

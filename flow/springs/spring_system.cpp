@@ -83,6 +83,7 @@ void SpringSystem::velocity_rates(Real, const SpringState& y, SpringState& k) co
       if (s < 0) force -= (surroundings.response.stiffness * s + surroundings.response.damping * wall.normal.dot(v)) * wall.normal;
     }
     if (surroundings.field) force += surroundings.field->at(x);
+    if (!surroundings.load.empty()) force += surroundings.load[i];
     k.v[i] = force / n.mass[i] + surroundings.gravity - surroundings.drag * (v - surroundings.wind);
   }, kGrain);
 

@@ -29,6 +29,7 @@ struct Surroundings {
   std::vector<PenaltyWall> walls;
   std::vector<PlaneContact> contacts;
   PenaltyResponse response;  ///< of walls and contacts; walls have no friction
+  std::vector<Vec3> load;    ///< force on each point [N]; empty: none
 };
 
 /// How the implicit step is solved.
@@ -61,6 +62,11 @@ class SpringSystem {
   void position_rates(Real t, const SpringState& y, SpringState& k) const;
   void rates(Real t, const SpringState& y, SpringState& k) const;
   void implicit_euler(Real t, Real dt, SpringState& y);
+  /// The implicit step of dt [s] as Newton's method begins it: linearised about y. Of any scheme it says what many small steps come to.
+  ///   velocity  out: what each point goes over dt [m/s]; of held ones their own
+  ///   answer    out: A = M + dt^2 K + dt C [kg]; impulses J [N s] through the step, on top of load, change those by A^-1 J. Held points stand
+  ///             alone in it
+  void predict(Real dt, const SpringState& y, std::vector<Vec3>& velocity, BlockMatrix& answer);
   BlockNewton::Report implicit_report() const;  ///< of the last implicit step
 
   /// Fastest oscillation omega and fastest decay gamma [1/s] about the state, of springs, walls, contacts and drag: largest

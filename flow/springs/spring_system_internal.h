@@ -27,6 +27,9 @@ struct SpringSystem::Impl {
   std::vector<HalfSpring> half;
   std::unique_ptr<ImplicitSolve> implicit;
   Real mean_rest = 0;
+
+  /// Where the implicit step begins, and would end without springs.
+  ImplicitSolve& begin(const Surroundings& around, Real dt, const SpringState& y);
 };
 
 }  // namespace effuse::flow::springs

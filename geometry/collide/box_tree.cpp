@@ -45,13 +45,24 @@ float rounded_down(Real x) {
 
 }  // namespace
 
-BoxTree::BoxTree(std::span<const Binary> nodes) {
-  if (nodes.empty()) return;
-  CHECK_LE(depth_of(nodes), kDeepest);
-  bounds_ = nodes[0].box;
+void BoxTree::set_bounds(const Box3& bounds) {
+  bounds_ = bounds;
   centre_ = bounds_.center();
   const Real extent = bounds_.sizes().maxCoeff() / 2;
   scale_ = extent > 1e-150 ? 1 / extent : 1;
+}
+
+void BoxTree::place(Node& node, int child, const Box3& box) const {
+  for (int axis = 0; axis < 3; ++axis) {
+    node.low[axis][child] = rounded_down((box.min()[axis] - centre_[axis]) * scale_) - kPad;
+    node.high[axis][child] = -rounded_down(-(box.max()[axis] - centre_[axis]) * scale_) + kPad;
+  }
+}
+
+BoxTree::BoxTree(std::span<const Binary> nodes) {
+  if (nodes.empty()) return;
+  CHECK_LE(depth_of(nodes), kDeepest);
+  set_bounds(nodes[0].box);
 
   // A node's four children: its two, of which those of largest surface are replaced by theirs.
   struct Open {
@@ -86,15 +97,10 @@ BoxTree::BoxTree(std::span<const Binary> nodes) {
     }
     Node& node = nodes_.emplace_back();
     for (int k = 0; k < 4; ++k) {
-      for (int axis = 0; axis < 3; ++axis) {
-        if (k >= count) {
-          node.low[axis][k] = std::numeric_limits<float>::infinity();
-          node.high[axis][k] = -std::numeric_limits<float>::infinity();
-          continue;
-        }
-        const Box3& box = nodes[child[k]].box;
-        node.low[axis][k] = rounded_down((box.min()[axis] - centre_[axis]) * scale_) - kPad;
-        node.high[axis][k] = -rounded_down(-(box.max()[axis] - centre_[axis]) * scale_) + kPad;
+      if (k < count) place(node, k, nodes[child[k]].box);
+      for (int axis = 0; k >= count && axis < 3; ++axis) {
+        node.low[axis][k] = std::numeric_limits<float>::infinity();
+        node.high[axis][k] = -std::numeric_limits<float>::infinity();
       }
       node.child[k] = k < count ? nodes[child[k]].left : -1;
     }

@@ -29,6 +29,10 @@ class BoxTree {
   BoxTree() = default;  ///< no items
   explicit BoxTree(std::span<const Binary> nodes);
 
+  /// Items have other boxes now: box(item). The tree keeps its branches, good while neighbours stay neighbours.
+  template <class BoxOf>
+  void refit(BoxOf&& box);
+
   bool empty() const { return nodes_.empty(); }
   const Box3& bounds() const { return bounds_; }
 
@@ -58,6 +62,9 @@ class BoxTree {
     float key;
     std::int32_t child;
   };
+  /// About centre_ and scale_, rounded outward.
+  void place(Node& node, int child, const Box3& box) const;
+  void set_bounds(const Box3& bounds);
   /// Puts those of the four children with key <= limit on the stack, the least on top.
   static void push(const Node& node, const Four& key, float limit, Waiting* stack, int& top);
 
@@ -87,6 +94,22 @@ class MovingBoxes {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+template <class BoxOf>
+void BoxTree::refit(BoxOf&& box) {
+  if (empty()) return;
+  // Children are laid out behind their parents.
+  std::vector<Box3> whole(nodes_.size());
+  const auto of = [&](std::int32_t child) { return child < 0 ? Box3(box(static_cast<Index>(-1 - child))) : whole[static_cast<std::size_t>(child)]; };
+  const auto used = [](const Node& node, int k) { return node.low[0][k] <= node.high[0][k]; };
+  for (std::size_t n = nodes_.size(); n-- > 0;)
+    for (int k = 0; k < 4; ++k)
+      if (used(nodes_[n], k)) whole[n].extend(of(nodes_[n].child[static_cast<std::size_t>(k)]));
+  set_bounds(whole[0]);
+  for (Node& node : nodes_)
+    for (int k = 0; k < 4; ++k)
+      if (used(node, k)) place(node, k, of(node.child[static_cast<std::size_t>(k)]));
+}
 
 inline void BoxTree::push(const Node& node, const Four& key, float limit, Waiting* stack, int& top) {
   const int first = top;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/base/check.h"
 #include "geometry/base/error.h"
 #include "geometry/collide/collision_mesh_internal.h"
 
@@ -155,6 +156,15 @@ CollisionMesh::CollisionMesh(const TriMesh& mesh) {
 
 std::optional<CollisionMesh::Nearest> CollisionMesh::nearest(const Vec3& p, Real reach) const { return impl_->nearest(p, reach); }
 
+Vec3 CollisionMesh::weights(Index triangle, const Vec3& p) const {
+  const auto& [a, b, c] = impl_->corners[triangle];
+  const Vec3 u = b - a, v = c - a, w = p - a;
+  const Real uu = u.squaredNorm(), uv = u.dot(v), vv = v.squaredNorm(), wu = w.dot(u), wv = w.dot(v), d = uu * vv - uv * uv;
+  if (!(d > 0)) return Vec3::Constant(Real{1} / 3);
+  const Real second = (vv * wu - uv * wv) / d, third = (uu * wv - uv * wu) / d;
+  return {1 - second - third, second, third};
+}
+
 Real CollisionMesh::signed_distance(const Vec3& p, Real reach) const {
   const auto found = nearest(p, reach);
   return found ? found->distance : std::numeric_limits<Real>::infinity();
@@ -163,6 +173,16 @@ Real CollisionMesh::signed_distance(const Vec3& p, Real reach) const {
 bool CollisionMesh::inside(const Vec3& p) const {
   if (impl_->report.solids == 0 || !impl_->bounds.contains(p)) return false;
   return signed_distance(p) < 0;
+}
+
+bool CollisionMesh::follow(std::span<const Vec3> positions) {
+  CHECK_EQ(positions.size(), impl_->mesh.positions.size());
+  if (impl_->report.parts != 1 || impl_->triangles.size() != impl_->mesh.triangles.size()) return false;
+  // Others may hold what this one has been.
+  auto next = impl_.use_count() == 1 ? std::const_pointer_cast<Impl>(impl_) : std::make_shared<Impl>(*impl_);
+  next->follow(positions);
+  impl_ = std::move(next);
+  return true;
 }
 
 const TriMesh& CollisionMesh::mesh() const { return impl_->mesh; }

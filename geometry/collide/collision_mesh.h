@@ -72,10 +72,18 @@ class CollisionMesh {
   static constexpr Real kApart = 30 * kPi / 180;
   std::size_t surroundings(const Vec3& p, Real reach, std::span<Nearest> out) const;
 
+  /// Barycentric coordinates of a point of a triangle of mesh(); of another point those of the place in the triangle's plane below it.
+  Vec3 weights(Index triangle, const Vec3& p) const;
+
   /// Distance [m], negative inside a solid; +infinity when nothing is within reach.
   Real signed_distance(const Vec3& p, Real reach = std::numeric_limits<Real>::infinity()) const;
   /// Inside a solid, not on its surface.
   bool inside(const Vec3& p) const;
+
+  /// Its vertices stand elsewhere now: positions [m], one for each of mesh()'s, in their order. The tree is refitted, nothing is welded, dropped
+  /// or turned anew: a solid that folds through itself, or a triangle that loses its area, is for the caller to avoid. Copies made before
+  /// keep what they had. False, and nothing done, where that is not enough: the mesh has several parts, or triangles without area.
+  bool follow(std::span<const Vec3> positions);
 
   /// As it is used: welded, without what was dropped, solids facing outward.
   const TriMesh& mesh() const;

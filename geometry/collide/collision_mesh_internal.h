@@ -66,6 +66,7 @@ struct CollisionMesh::Impl {
   void renumber_sides();
   void find_cavities();
   void make_normals();
+  void follow(std::span<const Vec3> positions);
   void make_trees();
   void find_hollows();
   Vec3 normal_across(Index triangle, int side, const Vec3& at) const;

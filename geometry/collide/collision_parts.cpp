@@ -93,6 +93,14 @@ std::vector<char> doubled_triangles(std::span<const Triangle> triangles) {
   return kind;
 }
 
+constexpr Real kOnSurface = 1e-12;  // of the largest coordinate
+
+Real largest_coordinate(std::span<const Vec3> positions) {
+  Real largest = 0;
+  for (const Vec3& x : positions) largest = std::max(largest, x.cwiseAbs().maxCoeff());
+  return largest;
+}
+
 }  // namespace
 
 void Impl::prepare(const TriMesh& input) {
@@ -104,9 +112,8 @@ void Impl::prepare(const TriMesh& input) {
   report.dropped = welded.dropped_triangles;
 
   // A triangle lower than what rounding of its coordinates may cost has no plane of its own.
-  Real largest = 0;
-  for (const Vec3& x : mesh.positions) largest = std::max(largest, x.cwiseAbs().maxCoeff());
-  constexpr Real kFlat = 1e-15, kOnSurface = 1e-12;
+  const Real largest = largest_coordinate(mesh.positions);
+  constexpr Real kFlat = 1e-15;
   const auto height_of = [&](const Triangle& t) {
     const Vec3 &a = mesh.positions[t[0]], &b = mesh.positions[t[1]], &c = mesh.positions[t[2]];
     const Real longest = std::sqrt(std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()}));
@@ -146,6 +153,19 @@ void Impl::prepare(const TriMesh& input) {
   std::copy_n(triangles.begin(), mesh.triangles.size(), mesh.triangles.begin());
   make_normals();
   make_trees();
+  find_hollows();
+}
+
+void Impl::follow(std::span<const Vec3> positions) {
+  mesh.positions.assign(positions.begin(), positions.end());
+  on_surface = kOnSurface * largest_coordinate(positions);
+  make_normals();
+  bounds = geometry::bounds(mesh);
+  tree.refit([&](Index t) {
+    Box3 box;
+    for (const Vec3& x : corners[t]) box.extend(x);
+    return box;
+  });
   find_hollows();
 }
 
@@ -336,6 +356,7 @@ void Impl::make_normals() {
     }
   }
   std::vector<Index> slot(3 * triangles.size(), kNobody);
+  fan_normal.clear();
   fan.resize(triangles.size());
   for (Index t = 0; t < triangles.size(); ++t) {
     for (Index k = 0; k < 3; ++k) {

@@ -31,6 +31,35 @@ void Obstacles::move(std::size_t i, const RigidMotion& motion) {
   impl_->changed.push_back(static_cast<Index>(i));
 }
 
+Vec3 Obstacle::velocity_at(Index triangle, const Vec3& point) const {
+  if (!deforms()) return motion.velocity_at(point, 1);
+  if (motion.duration() == 0) return Vec3::Zero();
+  const Triangle& t = shape.mesh().triangles[triangle];
+  const Vec3 w = shape.weights(triangle, point);
+  return w[0] * velocity[t[0]] + w[1] * velocity[t[1]] + w[2] * velocity[t[2]];
+}
+
+void Obstacles::deform(std::size_t i, std::span<const Vec3> positions, std::span<const Vec3> velocities, Real duration, std::span<const Triangle> triangles) {
+  CHECK_LT(i, size());
+  CHECK(impl_->all[i].has_value());
+  CHECK_EQ(velocities.size(), positions.size());
+  Obstacle& o = *impl_->all[i];
+  const auto anew = [&](std::span<const Triangle> faces) {
+    TriMesh mesh;
+    mesh.positions.assign(positions.begin(), positions.end());
+    mesh.triangles.assign(faces.begin(), faces.end());
+    o.shape = CollisionMesh(mesh);
+    CHECK_EQ(o.shape.mesh().positions.size(), positions.size());
+  };
+  const std::vector<Vec3>& now = o.shape.mesh().positions;
+  const bool elsewhere = !std::equal(now.begin(), now.end(), positions.begin(), positions.end());
+  if (!triangles.empty()) anew(triangles);
+  else if (elsewhere && !o.shape.follow(positions)) anew(std::vector<Triangle>(o.shape.mesh().triangles));
+  o.velocity.assign(velocities.begin(), velocities.end());
+  o.motion = RigidMotion({}, {}, duration);
+  impl_->changed.push_back(static_cast<Index>(i));
+}
+
 void Obstacles::set_temperature(std::size_t i, Real kelvin) {
   CHECK_LT(i, size());
   CHECK(impl_->all[i].has_value());
@@ -57,6 +86,7 @@ void Obstacles::update() {
     }
     place.now = placed_box(obstacle->motion.to(), obstacle->shape.bounds());
     place.swept = obstacle->motion.swept_box(obstacle->shape.bounds());
+    for (std::size_t v = 0; v < obstacle->velocity.size(); ++v) place.swept.extend(Vec3(obstacle->shape.mesh().positions[v] - obstacle->motion.duration() * obstacle->velocity[v]));
     impl_->boxes.set(i, place.swept);
   }
   impl_->changed.clear();
@@ -88,6 +118,12 @@ Box3 Obstacles::bounds() const {
 Box3 Obstacles::swept_bounds() const {
   CHECK(impl_->up_to_date());
   return impl_->swept;
+}
+
+Box3 Obstacles::swept_bounds(std::size_t i) const {
+  CHECK(impl_->up_to_date());
+  CHECK(holds(i));
+  return impl_->place[i].swept;
 }
 
 void Obstacles::meeting(const Box3& box, std::vector<Index>& out) const {

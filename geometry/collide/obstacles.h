@@ -12,6 +12,7 @@ namespace effuse::geometry {
 
 /// A mesh in the world, with its way through the current step.
 ///   shape        shared by as many obstacles as like
+///   velocity     of the vertices of shape.mesh() [m/s], of an obstacle that deforms (Obstacles::deform); empty: it is rigid
 ///   temperature  [K], handed on in contacts; 0: none of its own
 ///   surface      handed on in contacts; 0 is the terrain's
 struct Obstacle {
@@ -19,6 +20,12 @@ struct Obstacle {
   RigidMotion motion;
   Real temperature = 0;
   Index surface = 1;
+  std::vector<Vec3> velocity = {};
+
+  bool deforms() const { return !velocity.empty(); }
+  bool moves() const { return motion.moves() || (deforms() && motion.duration() > 0); }
+  /// Of the place `point` (in the world) of a triangle of the mesh, at the step's end [m/s].
+  Vec3 velocity_at(Index triangle, const Vec3& point) const;
 };
 
 /// Any number of obstacles behind one set of questions. FCL's dynamic tree of boxes holds them (broad phase); where
@@ -36,6 +43,14 @@ class Obstacles {
   /// Its number: 0, 1, ... in the order they come.
   std::size_t add(Obstacle obstacle);
   void move(std::size_t i, const RigidMotion& motion);
+  /// Makes i a surface that deforms: vertices of its mesh, in the world, at the step's end [m] and the velocities [m/s] at which they have
+  /// come there through a step of `duration` [s], straight. Tree and normals are refitted, in O(n); other `triangles`, or a mesh that
+  /// cannot be refitted (CollisionMesh::follow), make it anew. Vertices must then be all used, none at another's place.
+  ///
+  /// A particle (slide.h) meets it as a shape that goes straight, without turning, at the velocity of the place nearest to it: what is
+  /// kept exactly is where it is beside that place. While no vertex goes further than two thirds of a particle's radius in a step, particles
+  /// keep nine tenths of theirs.
+  void deform(std::size_t i, std::span<const Vec3> positions, std::span<const Vec3> velocities, Real duration, std::span<const Triangle> triangles = {});
   void set_temperature(std::size_t i, Real kelvin);  ///< needs no update()
   /// Takes i out for good: nothing meets it. Numbers of the others stay.
   void remove(std::size_t i);
@@ -48,6 +63,7 @@ class Obstacles {
   const Obstacle& operator[](std::size_t i) const;  ///< one it holds (checked)
   Box3 bounds() const;        ///< of everything at the step's end; empty box: no obstacles
   Box3 swept_bounds() const;  ///< of everything on all of its way
+  Box3 swept_bounds(std::size_t i) const;  ///< of one it holds
 
   /// For each point the up to per_point (1 .. 16) nearest obstacles within reach [m], one contact an obstacle, with obstacles
   /// where they are at the step's end (motion.to()); by distance, then surface, then number.

@@ -52,7 +52,7 @@ class NearestContacts {
     number_[slot] = which;
     const RigidPose& pose = obstacle.motion.to();
     const Vec3 point = pose.world(found.point);
-    out_[slot] = {point, pose.orientation * found.normal, found.distance, obstacle.motion.velocity_at(point, 1), obstacle.temperature, obstacle.surface};
+    out_[slot] = {point, pose.orientation * found.normal, found.distance, obstacle.velocity_at(found.triangle, point), obstacle.temperature, obstacle.surface};
   }
   std::size_t count() const { return count_; }
   bool full() const { return count_ == out_.size(); }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <list>
 #include <vector>
 
 #include "geometry/base/check.h"
@@ -42,6 +43,7 @@ struct Scratch {
   std::vector<Met> met;
   std::vector<Index> passed;      // obstacles that no longer hold it: started inside, or crushed by
   std::vector<HalfSpace> bounds;
+  std::list<std::pair<Index, RigidMotion>> led;  // of obstacles that deform, as this particle sees them
 };
 
 Box3 around(const Vec3& x, Real r) { return {x - Vec3::Constant(r), x + Vec3::Constant(r)}; }
@@ -55,17 +57,23 @@ class Sliding {
 
  private:
   const Obstacle& at(Index k) const { return *obstacles_.impl().all[k]; }
+  const RigidMotion& motion(Index k);
   bool passed(Index k) const { return std::find(scratch_.passed.begin(), scratch_.passed.end(), k) != scratch_.passed.end(); }
   /// Of a point of obstacle k, in the whole step [m].
-  Vec3 step_velocity(Index k, const Vec3& world) const {
-    const RigidMotion& m = at(k).motion;
+  Vec3 step_velocity(Index k, const Vec3& world) {
+    const RigidMotion& m = motion(k);
     return m.shift() + m.turn().cross(world - (m.from().position + s_ * m.shift()));
+  }
+  /// Of its place [m/s].
+  Vec3 velocity_at(const Touch& touch) {
+    const RigidMotion& m = motion(touch.obstacle);
+    return at(touch.obstacle).deforms() ? at(touch.obstacle).velocity_at(touch.triangle, m.pose(s_).body(touch.point)) : m.velocity_at(touch.point, s_);
   }
   std::optional<CollisionMesh::Nearest> nearest(Index k, const RigidPose& pose, const Vec3& x, Real reach) const;
   void find_touches();
   bool respond();
   void give_way();
-  Path path() const;
+  Path path();
   bool advance(const Path& path);
   void settle();
 
@@ -74,6 +82,7 @@ class Sliding {
   Real r_, room_;
   Scratch& scratch_;
   Slid out_;
+  Vec3 begin_ = Vec3::Zero();
   Vec3 wish_ = Vec3::Zero();  // [m] in a whole step
   Real s_ = 0;
   int last_ = -1;             // obstacle met last
@@ -88,6 +97,18 @@ std::optional<CollisionMesh::Nearest> Sliding::nearest(Index k, const RigidPose&
   return shape.nearest(local, reach);
 }
 
+/// The obstacle's; of one that deforms the straight way of its place nearest to where the particle began.
+const RigidMotion& Sliding::motion(Index k) {
+  const Obstacle& obstacle = at(k);
+  if (!obstacle.deforms()) return obstacle.motion;
+  for (const auto& [number, led] : scratch_.led)
+    if (number == k) return led;
+  const auto place = obstacle.shape.nearest(begin_);
+  const Vec3 way = obstacle.motion.duration() * obstacle.velocity_at(place->triangle, place->point);
+  scratch_.led.emplace_back(k, RigidMotion({-way}, {}, obstacle.motion.duration()));
+  return scratch_.led.back().second;
+}
+
 void Sliding::find_touches() {
   scratch_.touches.clear();
   const Real reach = kTouch * room_;
@@ -99,7 +120,7 @@ void Sliding::find_touches() {
   };
   for (const Index k : scratch_.near) {
     if (passed(k)) continue;
-    const RigidPose pose = at(k).motion.pose(s_);
+    const RigidPose pose = motion(k).pose(s_);
     const auto found = nearest(k, pose, out_.x, reach);
     if (!found || found->distance > reach) continue;
     if (found->distance < -at(k).shape.impl().on_surface) {
@@ -111,7 +132,7 @@ void Sliding::find_touches() {
   // Those met before that it has not left: in a hollow the nearest is not the only one.
   for (const Met& met : scratch_.met) {
     if (passed(met.obstacle)) continue;
-    const RigidPose pose = at(met.obstacle).motion.pose(s_);
+    const RigidPose pose = motion(met.obstacle).pose(s_);
     const auto& [a, b, c] = at(met.obstacle).shape.impl().corners[met.triangle];
     const Vec3 local = pose.body(out_.x), point = closest_point_on_triangle(local, a, b, c).point;
     const Real distance = (local - point).norm();
@@ -141,7 +162,7 @@ bool Sliding::respond() {
     bounds.clear();
     Real fastest = w.norm();
     for (const Touch& touch : scratch_.touches) {
-      const Vec3 surface = velocity ? at(touch.obstacle).motion.velocity_at(touch.point, s_) : step_velocity(touch.obstacle, touch.point);
+      const Vec3 surface = velocity ? velocity_at(touch) : step_velocity(touch.obstacle, touch.point);
       bounds.push_back({touch.normal, surface});
       fastest = std::max(fastest, surface.norm());
       answer(w, surface, touch.normal);
@@ -178,12 +199,11 @@ void Sliding::give_way() {
 }
 
 /// Straight on; in the frame of a turning surface that it lies on, straight along that.
-Path Sliding::path() const {
+Path Sliding::path() {
   int carrier = -1;
   Real most = 0;
   for (const Touch& touch : scratch_.touches) {
-    const RigidMotion& motion = at(touch.obstacle).motion;
-    if (!motion.turns()) continue;
+    if (!motion(touch.obstacle).turns()) continue;
     const Vec3 surface = step_velocity(touch.obstacle, touch.point);
     const Real away = (wish_ - surface).dot(touch.normal), speed = surface.norm();
     if (away > 1e-9 * (speed + wish_.norm()) || speed < most) continue;
@@ -192,9 +212,9 @@ Path Sliding::path() const {
   }
   if (carrier < 0) return {.frame = {}, .start = out_.x, .way = wish_, .begin = s_};
   const auto k = static_cast<Index>(carrier);
-  const RigidMotion& motion = at(k).motion;
-  const RigidPose pose = motion.pose(s_);
-  return {.frame = motion, .start = pose.body(out_.x), .way = pose.orientation.conjugate() * (wish_ - step_velocity(k, out_.x)), .begin = s_};
+  const RigidMotion& frame = motion(k);
+  const RigidPose pose = frame.pose(s_);
+  return {.frame = frame, .start = pose.body(out_.x), .way = pose.orientation.conjugate() * (wish_ - step_velocity(k, out_.x)), .begin = s_};
 }
 
 /// Goes on until it meets something. False: nothing, and the step is at its end.
@@ -208,7 +228,7 @@ bool Sliding::advance(const Path& way) {
     Real rho = room_;
     for (const Touch& touch : scratch_.touches)
       if (touch.obstacle == k) rho = std::min(rho, kKeep * touch.distance);
-    const auto impact = sweep_path(at(k).shape, at(k).motion, way, rho);
+    const auto impact = sweep_path(at(k).shape, motion(k), way, rho);
     if (!impact || (first && impact->time >= first->time)) continue;
     first = impact;
     obstacle = k;
@@ -255,7 +275,7 @@ void Sliding::settle() {
     scratch_.touches.clear();
     for (const Index k : scratch_.near) {
       if (out_.crushed && passed(k)) continue;
-      const RigidPose& pose = at(k).motion.to();
+      const RigidPose& pose = motion(k).to();
       const auto found = nearest(k, pose, out_.x, 2 * r_);
       if (!found || found->distance >= 2 * r_) continue;
       const Vec3 normal = pose.orientation * found->normal;
@@ -285,7 +305,7 @@ void Sliding::settle() {
       Real rho = r_;
       for (const Touch& touch : scratch_.touches)
         if (touch.obstacle == k) rho = std::min(rho, touch.distance / 4);
-      if (const auto impact = sweep_path(at(k).shape, RigidMotion(at(k).motion.to()), way, rho)) share = std::min(share, impact->time);
+      if (const auto impact = sweep_path(at(k).shape, RigidMotion(motion(k).to()), way, rho)) share = std::min(share, impact->time);
     }
     if (share < 1) share /= 2;  // something stands there: half the way to it
     out_.x += share * push;
@@ -296,6 +316,8 @@ void Sliding::settle() {
 Slid Sliding::go(const Vec3& x, const Vec3& dx, const Vec3& v) {
   scratch_.met.clear();
   scratch_.passed.clear();
+  scratch_.led.clear();
+  begin_ = x;
   out_.x = x;
   out_.v = v;
   wish_ = dx;
@@ -310,7 +332,7 @@ Slid Sliding::go(const Vec3& x, const Vec3& dx, const Vec3& v) {
     }
     if (round > options_.rounds + kMoreRounds) {
       out_.crushed = true;
-      const RigidMotion& motion = at(static_cast<Index>(std::max(last_, 0))).motion;
+      const RigidMotion& motion = this->motion(static_cast<Index>(std::max(last_, 0)));
       if (last_ >= 0) out_.x = motion.to().world(motion.pose(s_).body(out_.x));
       s_ = 1;
       break;

@@ -8,10 +8,11 @@
 #include "flow/scene/placing.h"
 #include "flow/scene/simulation.h"
 #include "geometry/base/error.h"
+#include "geometry/procedural/primitives.h"
 #include "geometry/terrain/plane.h"
 #include "importers/scene/scene_file.h"
 
-/// A scene of a few lines over a plane, 24 frames a second, for tests of effects.
+/// A scene of a few lines over a plane, 24 frames a second, for tests of effects. Files hold a level sheet, two metres wide.
 namespace effuse::flow {
 
 struct EffectScene {
@@ -32,7 +33,7 @@ struct EffectScene {
     for (const PlannedObstacle& plan : scene.obstacles) place_obstacle(plan, mesh_of(plan), terrain, obstacles, faults);
     for (const PlannedBody& plan : scene.bodies) place_body(plan, mesh_of(plan), terrain, bodies, faults);
     World world{&terrain, 1, &obstacles, &bodies, nullptr, scene.body_settings};
-    world.mesh = [](const PlannedForm&) { return geometry::TriMesh(); };
+    world.mesh = [](const PlannedForm&) { return geometry::make_grid(Vec3(-1, -1, 0), Vec2(0.25, 0.25), 8, 8); };
     for (const EffectPlan& plan : scene.effects)
       for (const Fault& fault : plan.misfits ? plan.misfits(world) : std::vector<Fault>()) faults.push_back(fault);
     if (!faults.empty()) throw InputError(faults);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "geometry/collide/collision_mesh.h"
+#include "geometry/procedural/primitives.h"
 #include "tests/flow/effects/effect_scene.h"
 
 /// Effects that meet rigid bodies which another effect moves.
@@ -133,6 +134,81 @@ TEST(MetThings, PiecesGoOnToTheSameBits) {
   for (EffectScene* each : {&whole, &again}) each->frames(2);
   EXPECT_EQ(whole.simulation->state_hash(), again.simulation->state_hash());
   EXPECT_TRUE(resumes(kWall + kRain, 7, 1));
+}
+
+/// Makes blocks of crust, as lava does: the first at 1 s, another at 2 s, the first is gone at 3 s.
+class BlockMaker final : public Effect {
+ public:
+  std::string_view name() const override { return "maker"; }
+  Real time() const override { return time_; }
+  void step(Real t_end) override { time_ = t_end; }
+  bool makes_pieces() const override { return true; }
+  std::vector<SolidPiece> pieces() const override {
+    std::vector<SolidPiece> all;
+    const auto cube = std::make_shared<const geometry::TriMesh>(geometry::make_box(Vec3(-0.5, -0.5, -0.5), Vec3(0.5, 0.5, 0.5)));
+    if (time_ >= 1 && time_ < 3) all.push_back({4, SolidPiece::kNoBody, cube, {Vec3(time_, 0, 0)}, 900});
+    if (time_ >= 2) all.push_back({7, SolidPiece::kNoBody, cube, {Vec3(0, 5, -time_)}, 900});
+    return all;
+  }
+  std::size_t memory() const override { return 0; }
+  void add_to(StateHash&) const override {}
+  void save(StateWriter&) const override {}
+  void load(StateReader&) override {}
+  std::vector<std::pair<std::string, double>> figures() const override { return {}; }
+  std::string status() const override { return ""; }
+
+ private:
+  Real time_ = 0;
+};
+
+TEST(MetThings, BlocksOfCrustAreMetWhileTheyAreThere) {
+  BlockMaker maker;
+  MetThings things(World{});
+  EXPECT_TRUE(things.empty());
+  things.meet({&maker});
+  EXPECT_FALSE(things.empty()) << "some may come";
+  things.move(0, 0.1);
+  EXPECT_EQ(things.obstacles().bounds().isEmpty(), true);
+  const auto contact = [](const MetThings& of, const Vec3& x) {
+    geometry::Contact c;
+    return of.obstacles().contacts(x, 0.2, std::span(&c, 1)) > 0 ? c : geometry::Contact{};
+  };
+
+  maker.step(1);
+  things.move(0.5, 0.1);
+  EXPECT_NEAR(contact(things, Vec3(1, 0, 0.6)).distance, 0.1, 1e-12) << "it comes where it is";
+  EXPECT_EQ(contact(things, Vec3(1, 0, 0.6)).surface_velocity, Vec3::Zero());
+  EXPECT_EQ(contact(things, Vec3(1, 0, 0.6)).surface_temperature, 900);
+
+  // It goes through the frame from where it was; the other has just come.
+  maker.step(2);
+  things.move(1.25, 0.25);
+  EXPECT_NEAR(contact(things, Vec3(1.5, 0, 0.6)).distance, 0.1, 1e-9);
+  EXPECT_NEAR(contact(things, Vec3(1.5, 0, 0.6)).surface_velocity.x(), 1, 1e-9);
+  EXPECT_TRUE(contact(things, Vec3(0, 5, -1.4)).any());
+  std::vector<PlaneContact> planes;
+  things.add_planes(nullptr, std::vector<Vec3>{Vec3(1.5, 0, 0.55), Vec3(20, 0, 0)}, 0.2, 0, planes);
+  ASSERT_EQ(planes.size(), 1u);
+  EXPECT_NEAR(planes[0].velocity.x(), 1, 1e-9);
+
+  // A checkpoint between: the same contacts.
+  StateWriter out;
+  things.save(out);
+  MetThings again(World{});
+  again.meet({&maker});
+  StateReader in(out.bytes(), "");
+  again.load(in);
+  for (MetThings* each : {&things, &again}) each->move(1.5, 0.5);
+  for (const Vec3& x : {Vec3(2, 0, 0.6), Vec3(0, 5, -1.4)}) {
+    EXPECT_TRUE(contact(again, x).any());
+    EXPECT_EQ(contact(things, x).distance, contact(again, x).distance);
+    EXPECT_EQ(contact(things, x).surface_velocity, contact(again, x).surface_velocity);
+  }
+
+  maker.step(3);
+  things.move(2.5, 0.5);
+  EXPECT_FALSE(contact(things, Vec3(3, 0, 0.6)).any()) << "gone";
+  EXPECT_NEAR(contact(things, Vec3(0, 5, -2.4)).distance, 0.1, 1e-9);
 }
 
 }  // namespace
