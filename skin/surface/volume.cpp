@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 
 #include "geometry/base/parallel.h"
 #include "geometry/base/zones.h"
@@ -52,8 +53,16 @@ EFFUSE_CLONES void corner_sums(float* v) {
 /// Volumes enclosed by one field at different shifts.
 class Enclosed {
  public:
+  using Range = KnownVolumes::Range;
   Enclosed(const Blocks& blocks, float outside, const Field& phi, const Field& above)
       : blocks_(blocks), outside_(outside), phi_(phi), above_(above), range_(blocks.size(), {1, 0}), full_(blocks.size(), -1) {}
+  /// Ranges that the last frame knows.
+  void take_ranges(const KnownVolumes& known) {
+    if (!known.last_range || known.last_range->empty()) return;
+    for (std::size_t b = 0; b < range_.size(); ++b)
+      if (!known.stale[b]) range_[b] = (*known.last_range)[known.before[b]];
+  }
+  std::vector<Range> ranges() && { return std::move(range_); }
   Real operator()(float shift) {
     find_ranges([](std::size_t) { return true; });
     return parallel_sum(
@@ -74,9 +83,6 @@ class Enclosed {
   }
 
  private:
-  struct Range {
-    float low, high;  // low > high: not looked for yet
-  };
   static constexpr std::size_t kBeyond[7] = {14, 16, 17, 22, 23, 25, 26};  // where a block's cells reach
 
   /// Of the blocks asked for and those that their cells reach into.
@@ -152,11 +158,25 @@ Real enclosed(const Blocks& blocks, float outside, const Field& phi, const Field
 Shift matching_shift(const Blocks& blocks, float outside, const Field& phi, const Field& above, Real target, float most, KnownVolumes& known) {
   ZONE("skin.match_volume");
   Enclosed volume(blocks, outside, phi, above);
-  const auto excess = [&](int k) { return volume(k, known) / target - 1; };
+  volume.take_ranges(known);
+  std::map<int, Real> found;
+  const auto excess = [&](int k) {
+    const auto at = found.find(k);
+    return at != found.end() ? at->second : found[k] = volume(k, known) / target - 1;
+  };
   // The volume rises with the shift (it may jump: pieces, thin sheets), so there is one pair of neighbouring steps between which it passes
   // the target, wherever the search begins. Out by steps that double until the target lies between, then regula falsi with the
   // weight of an end that stays halved (Illinois).
-  const int end = static_cast<int>(most * kShiftSteps), first = std::clamp(known.guess, -end, end);
+  const int end = static_cast<int>(most * kShiftSteps);
+  int first = std::clamp(known.guess, -end, end);
+  // From two steps that the last frame knows, cheap ones, to where the target should lie: others have to be looked for in all blocks.
+  if (known.last && known.last->contains(first))
+    for (const int beside : {first + 1, first - 1}) {
+      if (!known.last->contains(beside)) continue;
+      const Real slope = (excess(beside) - excess(first)) * (beside - first);
+      if (slope > 0) first = static_cast<int>(std::clamp<Real>(first + std::floor(-excess(first) / slope), -end, end));
+      break;
+    }
   int low = first, high = first;
   Real at_low = excess(first), at_high = at_low;
   const bool outward = at_low < 0;
@@ -195,6 +215,7 @@ Shift matching_shift(const Blocks& blocks, float outside, const Field& phi, cons
   if (known.last)
     for (const auto& [k, of_blocks] : *known.last)
       if (k >= low - 1 && k <= high + 1 && !known.now.contains(k)) volume(k, known);
+  known.range = std::move(volume).ranges();
   const Real exact = high > low && at_low < 0 && at_high >= 0 ? low - at_low / (at_high - at_low) * (high - low) : lower ? low : high;
   return {lower ? low : high, exact, ((lower ? at_low : at_high) + 1) * target};
 }
