@@ -52,12 +52,18 @@ struct Making {
   float depth() const { return sink + 2; }  // voxels deeper than this are outside, whatever they were
 };
 
-/// The field as it comes from the particles.
-void rasterize(const LevelSet::Impl& s, const Blocks& blocks, Raster& raster) {
-  if (s.rule.kernel == SurfaceKernel::kAnisotropic)
-    rasterize_anisotropic(s.particles, anisotropic_kernels(s.particles, s.rule.raster.spacing, s.rule.raster.reach, &blocks), blocks, s.rule.raster, raster.phi, raster.weight);
-  else
-    rasterize(s.particles, blocks, s.rule.raster, {}, raster);
+/// The field as it comes from the particles. felt: blocks whose values are asked for (rasterize_anisotropic); empty: all.
+void rasterize(const LevelSet::Impl& s, const Blocks& blocks, Raster& raster, std::span<const std::uint8_t> felt = {}) {
+  if (s.rule.kernel == SurfaceKernel::kRound) return rasterize(s.particles, blocks, s.rule.raster, {}, raster);
+  Blocks asked = blocks;
+  if (!felt.empty()) {
+    std::vector<BlockCoord> coords;
+    for (std::size_t b = 0; b < blocks.size(); ++b)
+      if (felt[b]) coords.push_back(blocks.coords()[b]);
+    asked = Blocks(coords);
+  }
+  const Kernels kernels = anisotropic_kernels(s.particles, s.rule.raster.spacing, s.rule.raster.reach, &asked);
+  rasterize_anisotropic(s.particles, kernels, blocks, s.rule.raster, raster.phi, raster.weight, felt);
 }
 
 /// The field before its shift, from the particles' own, on some of the blocks; ground: out. wanted: those of them whose values are asked for;
@@ -104,17 +110,19 @@ Renewal renew_field(const LevelSet::Impl& s, const Making& making, SurfaceCache:
   constexpr Real kRounding = 0.01;  // [voxels] sums are of floats
   Renewal renewal = find_stale(last, s.particles, s.blocks, std::max(felt + static_cast<Real>(beyond), s.rule.cover.factor > 0 ? covered : 0) + kRounding,
                                reach + kRounding);
-  const std::vector<std::uint8_t> needed = widened(s.blocks, renewal.stale, static_cast<int>(std::ceil(beyond / kSide)) + (round ? 0 : 1));
+  const std::vector<std::uint8_t> used = widened(s.blocks, renewal.stale, static_cast<int>(std::ceil(beyond / kSide))),
+                                  needed = round ? used : widened(s.blocks, used, 1);
   std::vector<BlockCoord> coords;
   std::vector<Index> from(s.blocks.size(), kNone);  // of each block, among the needed ones
   std::vector<Index> whole;                         // of each of these, among all
-  std::vector<std::uint8_t> wanted;
+  std::vector<std::uint8_t> wanted, felt_in;
   for (std::size_t b = 0; b < s.blocks.size(); ++b) {
     if (!needed[b]) continue;
     from[b] = static_cast<Index>(coords.size());
     coords.push_back(s.blocks.coords()[b]);
     whole.push_back(static_cast<Index>(b));
     wanted.push_back(renewal.stale[b]);
+    felt_in.push_back(used[b]);
   }
   if (coords.size() > s.blocks.size() * 2 / 3) {
     std::fill(renewal.stale.begin(), renewal.stale.end(), std::uint8_t{1});
@@ -137,7 +145,7 @@ Renewal renew_field(const LevelSet::Impl& s, const Making& making, SurfaceCache:
       for (const Index b : whole) to->insert(to->end(), &(*all)[kVoxels * b], &(*all)[kVoxels * b] + kVoxels);
     }
   } else {
-    rasterize(s, part, raster);
+    rasterize(s, part, raster, felt_in);
   }
   GroundField part_ground;
   const Field made = make_field(s, part, making, std::move(raster.phi), raster.weight, part_ground, wanted);

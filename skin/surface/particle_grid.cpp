@@ -53,11 +53,22 @@ ParticleGrid::ParticleGrid(const geometry::Points& points, Real voxel, Real side
   const auto local = [&](const Vec3& p) -> Vec3 { return (p - origin) / voxel; };
   std::vector<Index> column(n);
   std::vector<Column>& columns = data->columns;
-  Index current = kNone;  // the next particle is often in the same one
+  // Their numbers are looked up in a table as wide as all of them where that is no waste.
+  const Vec3 lowest = local(box.min()), highest = local(box.max());
+  const int x0 = column_of(lowest.x()), y0 = column_of(lowest.y());
+  const std::size_t wide = static_cast<std::size_t>(column_of(highest.y()) - y0) + 1, deep = static_cast<std::size_t>(column_of(highest.x()) - x0) + 1;
+  std::vector<Index> numbers(wide * deep <= 4 * n ? wide * deep : 0, kNone);
   for (std::size_t i = 0; i < n; ++i) {
     const Vec3 p = local(points.position[i]);
     const int cx = column_of(p.x()), cy = column_of(p.y());
-    if (current == kNone || columns[current].x != cx || columns[current].y != cy) current = data->table.number(pack(cx, cy, 0));
+    Index current;
+    if (numbers.empty()) {
+      current = data->table.number(pack(cx, cy, 0));
+    } else {
+      Index& known = numbers[static_cast<std::size_t>(cx - x0) * wide + static_cast<std::size_t>(cy - y0)];
+      if (known == kNone) known = data->table.number(pack(cx, cy, 0));
+      current = known;
+    }
     if (current == columns.size()) columns.push_back({cx, cy, 0, 0});
     column[i] = current;
     ++columns[current].end;

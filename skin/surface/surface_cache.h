@@ -70,7 +70,10 @@ void each_not_among(const ParticleGrid& one, const ParticleGrid& others, F&& f) 
     // Both by rising height: one walk along the two.
     const ParticleGrid::Column* there = others.column(column.x, column.y);
     Index k = there ? there->begin : 0;
-    const Index end = there ? there->end : 0;
+    const Index end = there ? there->end : 0, n = column.end - column.begin;
+    if (end - k == n && std::memcmp(&one.x()[column.begin], &others.x()[k], n * sizeof(Vec3)) == 0 &&
+        std::memcmp(&one.radius()[column.begin], &others.radius()[k], n * sizeof(float)) == 0)
+      continue;
     for (Index i = column.begin; i < column.end; ++i) {
       const Vec3& p = one.x()[i];
       while (k < end && lies_before(others.x()[k], p)) ++k;
