@@ -120,12 +120,13 @@ Real enclosed(const Blocks& blocks, float outside, const Field& phi, const Field
 inline constexpr int kShiftSteps = 128;
 struct Shift {
   int steps = 0;     ///< of 1 / kShiftSteps voxels
-  Real exact = 0;    ///< the same, between two steps where the target is
+  Real exact = 0;    ///< the same, between steps where the target is
   Real volume = -1;  ///< [voxels] enclosed by then
   float voxels() const { return static_cast<float>(steps) / kShiftSteps; }
 };
-/// The shift within +-most, in steps of 1 / kShiftSteps, at which enclosed() is the target as nearly as such steps allow (of two the
-/// smaller one); the nearer end when there is none. The same wherever one begins to look.
+/// The shift within +-most at which enclosed() is the target; the nearer end when there is none. Of the steps no farther from there than a
+/// volume of 5e-4 of the target, and two steps, it is the roundest one (which the largest power of two divides), else the nearest: as a
+/// film's lava moves it stays for some frames, and with it the surface where nothing moves. The same wherever one begins to look.
 Shift matching_shift(const Blocks& blocks, float outside, const Field& phi, const Field& above, Real target, float most, KnownVolumes& known);
 
 /// The face-connected sets of voxels on one side of the surface, within one block.
