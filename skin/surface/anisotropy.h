@@ -57,6 +57,7 @@ Real kernel_influence(float spacing, float reach);
 ///   phi     out: the field [voxels], conventions of rasterize()
 ///   weight  out: what W of rasterize() would be at the surface, for smooth(): crowd averaged with w_i, times that of a lone
 ///           particle; 0 far from particles
+///   wanted  blocks whose values are asked for, all around them being there: those of the others mean nothing; empty: all
 /// Each voxel is summed for itself, in float, within 1e-3 voxels of double. Blocks that lie a block and more from any voxel without
 /// a particle within one spacing are filled with one value. Same bits on any number of threads and any order of the points.
 ///
@@ -69,7 +70,7 @@ Real kernel_influence(float spacing, float reach);
 /// off edges that voxels of a quarter show. 1.3 to 1.8 times the time of rasterize(), kernels included, at 100,000 particles.
 /// Source: Zhu & Bridson 2005, ACM Trans. Graph. 24, 965-972; Yu & Turk 2013.
 void rasterize_anisotropic(const ParticleGrid& particles, const Kernels& kernels, const Blocks& blocks, const RasterOptions& options,
-                           Field& phi, Field& weight);
+                           Field& phi, Field& weight, std::span<const std::uint8_t> wanted = {});
 
 /// The same at one point, in double, over all particles: the twin that tests compare with.
 Real anisotropic_distance(const ParticleGrid& particles, const Kernels& kernels, const RasterOptions& options, const Vec3& p);

@@ -34,7 +34,8 @@ Blocks::Blocks(const std::vector<BlockCoord>& coords) {
   const auto data = std::make_shared<Data>();
   const std::size_t n = coords.size();
   // Packed coordinates have the order of the coordinates.
-  std::vector<std::uint64_t> key(n);
+  std::vector<std::uint64_t>& key = data->keys;
+  key.resize(n);
   for (std::size_t b = 0; b < n; ++b) key[b] = pack(coords[b][0], coords[b][1], coords[b][2]);
   std::sort(key.begin(), key.end());
   data->coords.resize(n);
@@ -72,12 +73,11 @@ Blocks::Blocks(const std::vector<BlockCoord>& coords) {
 
 std::vector<Index> same_places(const Blocks& blocks, const Blocks& others) {
   std::vector<Index> same(blocks.size(), kNone);
-  const std::vector<BlockCoord>& there = others.coords();
+  const std::vector<std::uint64_t>&here = blocks.keys(), &there = others.keys();
   Index other = 0;
-  for (std::size_t b = 0; b < blocks.size(); ++b) {
-    const BlockCoord& c = blocks.coords()[b];
-    while (other < there.size() && there[other] < c) ++other;
-    if (other < there.size() && there[other] == c) same[b] = other;
+  for (std::size_t b = 0; b < here.size(); ++b) {
+    while (other < there.size() && there[other] < here[b]) ++other;
+    if (other < there.size() && there[other] == here[b]) same[b] = other;
   }
   return same;
 }
@@ -116,20 +116,23 @@ Vec3 Blocks::gradient(std::span<const float> field, float outside, Index home, c
 }
 
 void Blocks::padded(std::span<const float> field, float outside, std::size_t b, float* out) const {
-  const std::array<Index, 27>& near = around(b);
+  std::array<const float*, 27> from;
+  std::array<float, kVoxels> none;  // of blocks that are not there
+  bool all = true;
+  for (std::size_t slot = 0; slot < 27; ++slot) {
+    const Index block = around(b)[slot];
+    from[slot] = block == kNone ? none.data() : &field[block * kVoxels];
+    all = all && block != kNone;
+  }
+  if (!all) none.fill(outside);
   for (int i = -1; i <= kSide; ++i) {
     const int a = i < 0 ? 0 : i < kSide ? 1 : 2;
-    for (int j = -1; j <= kSide; ++j) {
-      const int c = j < 0 ? 0 : j < kSide ? 1 : 2;
-      float* row = out + ((i + 1) * 10 + (j + 1)) * 10;
-      const std::size_t in_block = voxel_index(i & 7, j & 7, 0);
-      const auto block = [&](int d) { return near[static_cast<std::size_t>(a * 9 + c * 3 + d)]; };
-      row[0] = block(0) == kNone ? outside : field[block(0) * kVoxels + in_block + 7];
-      if (block(1) == kNone)
-        std::fill_n(row + 1, kSide, outside);
-      else
-        std::memcpy(row + 1, &field[block(1) * kVoxels + in_block], kSide * sizeof(float));
-      row[9] = block(2) == kNone ? outside : field[block(2) * kVoxels + in_block];
+    for (int j = -1; j <= kSide; ++j, out += 10) {
+      const float* const* row = from.data() + a * 9 + (j < 0 ? 0 : j < kSide ? 3 : 6);
+      const std::size_t at = voxel_index(i & 7, j & 7, 0);
+      out[0] = row[0][at + 7];
+      std::memcpy(out + 1, row[1] + at, kSide * sizeof(float));
+      out[9] = row[2][at];
     }
   }
 }

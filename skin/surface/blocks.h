@@ -31,6 +31,8 @@ class Blocks {
 
   std::size_t size() const { return data_->coords.size(); }
   const std::vector<BlockCoord>& coords() const { return data_->coords; }
+  /// pack() of the coordinates, rising.
+  const std::vector<std::uint64_t>& keys() const { return data_->keys; }
   /// Blocks around block b, itself in the middle (13), by (dx+1)*9 + (dy+1)*3 + dz+1; kNone: there is none.
   const std::array<Index, 27>& around(std::size_t b) const { return data_->around[b]; }
 
@@ -63,6 +65,7 @@ class Blocks {
 
   struct Data {
     std::vector<BlockCoord> coords;
+    std::vector<std::uint64_t> keys;
     std::vector<std::array<Index, 27>> around;
     KeyTable table;
   };

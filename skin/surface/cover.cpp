@@ -133,10 +133,12 @@ std::vector<float> ball_radii(const ParticleGrid& particles, const Cover& cover,
   return radius;
 }
 
-void cover_particles(const ParticleGrid& particles, const Blocks& blocks, const Cover& cover, const Field& weight, Field& phi) {
+void cover_particles(const ParticleGrid& particles, const Blocks& blocks, const Cover& cover, const Field& weight, Field& phi,
+                     std::span<const std::uint8_t> only) {
   ZONE("skin.cover");
   const float factor = cover.factor, blend = cover.blend;
   if (factor <= 0) return;
+  CHECK(only.empty() || only.size() == blocks.size());
   CHECK_GT(blend, 0.0f);
   CHECK_GT(cover.none, cover.all);
   const float largest = factor * static_cast<float>(parallel_max(particles.size(), 0, [&](std::size_t i) { return static_cast<Real>(particles.radius()[i]); }));
@@ -154,22 +156,25 @@ void cover_particles(const ParticleGrid& particles, const Blocks& blocks, const 
   // Particles near a block's shallow voxels that may be shallow themselves: others' balls ask for nothing. W at a particle is what the voxels
   // round it say but for its curvature, of some W / reach^2.
   const float surely = cover.none * (1 + 1.6f / (cover.reach * cover.reach));
-  std::vector<std::uint8_t> shallow(blocks.size(), 0), wanted(particles.size(), 0);
+  enum : std::uint8_t { kUnasked, kWanted, kNotWanted };
+  std::vector<std::uint8_t> shallow(blocks.size(), 0), asked(particles.size(), kUnasked);
   parallel_for(
       blocks.size(),
       [&](std::size_t b) {
+        if (!only.empty() && !only[b]) return;
         const float* value = &phi[b * kVoxels];
         // A ball asks for no less than -radius.
         shallow[b] = *std::max_element(value, value + kVoxels) > -largest - blend;
         if (!shallow[b]) return;
         each_near(b, [&](Index i, const Eigen::Vector3f&) {
-          std::atomic_ref<std::uint8_t> want(wanted[i]);
-          if (want.load(std::memory_order_relaxed) == 0 && blocks.sample(weight, 0, static_cast<Index>(b), particles.x()[i]) < surely)
-            want.store(1, std::memory_order_relaxed);
+          std::atomic_ref<std::uint8_t> want(asked[i]);
+          if (want.load(std::memory_order_relaxed) == kUnasked)
+            want.store(blocks.sample(weight, 0, static_cast<Index>(b), particles.x()[i]) < surely ? kWanted : kNotWanted, std::memory_order_relaxed);
         });
       },
       8);
-  const std::vector<float> radius = ball_radii(particles, cover, wanted);
+  std::transform(asked.begin(), asked.end(), asked.begin(), [](std::uint8_t a) { return std::uint8_t{a == kWanted}; });
+  const std::vector<float> radius = ball_radii(particles, cover, asked);
   parallel_ranges(blocks.size(), 8, [&](std::size_t begin, std::size_t end) {
     std::vector<Ball> near;
     Rows least, nearest;

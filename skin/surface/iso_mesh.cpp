@@ -97,18 +97,21 @@ Local local_field(const Padded& p, int i, int j, int k, const Eigen::Vector3f& x
   return {slope / 2, value - (x.array() * (1 - x.array()) * curved.array()).sum() / 2};
 }
 
-/// Vertices of a block's cells, quads left out.
-void mesh_cells(const Padded& p, MeshedBlock& out) {
+/// Vertices of a block's cells, quads left out; nullptr: it has none.
+std::unique_ptr<MeshedBlock> mesh_cells(const Padded& p) {
+  std::unique_ptr<MeshedBlock> meshed;
   for (int i = 0; i < kSide; ++i)
     for (int j = 0; j < kSide; ++j)
       for (int k = 0; k < kSide; ++k) {
         const unsigned configuration = p.configuration(i, j, k);
         if (configuration == 0 || configuration == 255) continue;
-        if (out.empty()) {
-          out.configuration.assign(kVoxels, 0);
-          out.joined.assign(kVoxels, 0);
-          out.first.assign(kVoxels, 0);
+        if (!meshed) {
+          meshed = std::make_unique<MeshedBlock>();
+          meshed->configuration.assign(kVoxels, 0);
+          meshed->joined.assign(kVoxels, 0);
+          meshed->first.assign(kVoxels, 0);
         }
+        MeshedBlock& out = *meshed;
         const std::size_t cell = voxel_index(i, j, k);
         const unsigned joined = joined_faces(p, i, j, k, configuration);
         out.configuration[cell] = static_cast<std::uint8_t>(configuration);
@@ -147,11 +150,13 @@ void mesh_cells(const Padded& p, MeshedBlock& out) {
           out.normal.push_back(normal.normalized().cast<Real>().normalized());
         }
       }
+  return meshed;
 }
 
 /// Quads round the crossed edges that begin at the block's voxels.
-void mesh_edges(const Blocks& blocks, std::size_t b, std::vector<MeshedBlock>& meshed) {
-  MeshedBlock& out = meshed[b];
+void mesh_edges(const Blocks& blocks, std::size_t b, std::vector<std::unique_ptr<MeshedBlock>>& meshed) {
+  MeshedBlock& out = *meshed[b];
+  out.quads.clear();
   const std::array<Index, 27>& around = blocks.around(b);
   struct Corner {
     std::uint8_t block;
@@ -160,7 +165,7 @@ void mesh_edges(const Blocks& blocks, std::size_t b, std::vector<MeshedBlock>& m
   // The vertex of cell (i, j, k), -1 .. 7, on its edge e.
   const auto corner = [&](int i, int j, int k, unsigned e) {
     const std::size_t slot = static_cast<std::size_t>(((i >> 3) + 1) * 9 + ((j >> 3) + 1) * 3 + (k >> 3) + 1);
-    const MeshedBlock& of = meshed[around[slot]];
+    const MeshedBlock& of = *meshed[around[slot]];
     const std::size_t cell = voxel_index(i & 7, j & 7, k & 7);
     const unsigned configuration = of.configuration[cell], joined = of.joined[cell];
     const std::uint8_t patch = joined == 0 ? kDualCells[configuration].patch[e] : dual_cell(configuration, joined).patch[e];
@@ -202,7 +207,7 @@ bool is_crossed(const Blocks& blocks, std::size_t b, const std::vector<std::int8
 bool widen(const Blocks& blocks, float outside, const Field& phi, const std::vector<std::int8_t>& side, Blocks& wider, Field& values) {
   std::vector<BlockCoord> coords;
   for (std::size_t b = 0; b < blocks.size(); ++b) {
-    if (side[b] > 0) continue;
+    if (side[b] > 0 || std::none_of(blocks.around(b).begin(), blocks.around(b).end(), [](Index other) { return other == kNone; })) continue;
     for (std::size_t slot = 0; slot < 27; ++slot) {
       if (blocks.around(b)[slot] != kNone) continue;
       const int d[3] = {static_cast<int>(slot / 9) - 1, static_cast<int>(slot / 3 % 3) - 1, static_cast<int>(slot % 3) - 1};
@@ -273,60 +278,71 @@ geometry::TriMesh iso_mesh(const Blocks& blocks, float outside, const Field& phi
     return iso_mesh(wider, outside, values);
   }
 
-  std::vector<MeshedBlock> meshed(blocks.size());
+  std::vector<std::unique_ptr<MeshedBlock>> meshed(blocks.size());
+  std::vector<MeshCache::Count> count(blocks.size());
   std::vector<std::uint8_t> edges(blocks.size(), 1);
   const std::vector<Index> good = last ? still_good(blocks, outside, *last, unchanged, edges) : std::vector<Index>(blocks.size(), kNone);
   parallel_for(
       blocks.size(),
       [&](std::size_t b) {
-        if (good[b] != kNone) meshed[b] = std::move(last->meshed[good[b]]);
-        else if (is_crossed(blocks, b, side)) mesh_cells(Padded(blocks, outside, phi, b), meshed[b]);
-        if (edges[b]) meshed[b].quads.clear();
+        if (good[b] != kNone) {
+          meshed[b] = std::move(last->meshed[good[b]]);
+          count[b] = last->count[good[b]];
+        } else if (is_crossed(blocks, b, side)) {
+          meshed[b] = mesh_cells(Padded(blocks, outside, phi, b));
+          if (meshed[b]) count[b].vertices = static_cast<Index>(meshed[b]->position.size());
+        }
       },
       16);
   parallel_for(
-      blocks.size(), [&](std::size_t b) { if (edges[b] && !meshed[b].empty()) mesh_edges(blocks, b, meshed); }, 16);
+      blocks.size(),
+      [&](std::size_t b) {
+        if (!edges[b] || !meshed[b]) return;
+        mesh_edges(blocks, b, meshed);
+        count[b].quads = static_cast<Index>(meshed[b]->quads.size());
+      },
+      16);
 
   ZONE("skin.assemble");
   std::vector<Index> vertices(blocks.size() + 1, 0), quads(blocks.size() + 1, 0);
   for (std::size_t b = 0; b < blocks.size(); ++b) {
-    vertices[b + 1] = vertices[b] + static_cast<Index>(meshed[b].position.size());
-    quads[b + 1] = quads[b] + static_cast<Index>(meshed[b].quads.size());
+    vertices[b + 1] = vertices[b] + count[b].vertices;
+    quads[b + 1] = quads[b] + count[b].quads;
   }
   geometry::TriMesh mesh;
   mesh.positions.resize(vertices.back());
   mesh.normals.resize(vertices.back());
   mesh.triangles.resize(2 * static_cast<std::size_t>(quads.back()));
+  const auto triangles_of = [&](std::size_t b) {
+    std::array<Index, 27> first;  // vertices of the blocks around
+    for (std::size_t slot = 0; slot < 27; ++slot) {
+      const Index other = blocks.around(b)[slot];
+      first[slot] = other == kNone ? kNone : vertices[other];
+    }
+    geometry::Triangle* out = mesh.triangles.data() + 2 * static_cast<std::size_t>(quads[b]);
+    for (MeshedBlock::Quad& quad : meshed[b]->quads) {
+      Index q[4];
+      for (std::size_t k = 0; k < 4; ++k) q[k] = first[quad.block[k]] + quad.vertex[k];
+      const auto& p = mesh.positions;
+      if (edges[b]) quad.along = (p[q[0]] - p[q[2]]).squaredNorm() <= (p[q[1]] - p[q[3]]).squaredNorm();
+      *out++ = quad.along ? geometry::Triangle{q[0], q[1], q[2]} : geometry::Triangle{q[0], q[1], q[3]};
+      *out++ = quad.along ? geometry::Triangle{q[0], q[2], q[3]} : geometry::Triangle{q[1], q[2], q[3]};
+    }
+  };
   parallel_for(
       blocks.size(),
       [&](std::size_t b) {
+        if (!meshed[b]) return;
         const BlockCoord& c = blocks.coords()[b];
         const Vec3 low(kSide * c[0], kSide * c[1], kSide * c[2]);
-        for (std::size_t v = 0; v < meshed[b].position.size(); ++v) mesh.positions[vertices[b] + v] = low + meshed[b].position[v].cast<Real>();
-        std::copy(meshed[b].normal.begin(), meshed[b].normal.end(), mesh.normals.begin() + vertices[b]);
+        for (std::size_t v = 0; v < meshed[b]->position.size(); ++v) mesh.positions[vertices[b] + v] = low + meshed[b]->position[v].cast<Real>();
+        std::copy(meshed[b]->normal.begin(), meshed[b]->normal.end(), mesh.normals.begin() + vertices[b]);
+        if (!edges[b]) triangles_of(b);  // split as they were
       },
       64);
   parallel_for(
-      blocks.size(),
-      [&](std::size_t b) {
-        if (meshed[b].quads.empty()) return;
-        std::array<Index, 27> first;  // vertices of the blocks around
-        for (std::size_t slot = 0; slot < 27; ++slot) {
-          const Index other = blocks.around(b)[slot];
-          first[slot] = other == kNone ? kNone : vertices[other];
-        }
-        geometry::Triangle* out = mesh.triangles.data() + 2 * static_cast<std::size_t>(quads[b]);
-        for (MeshedBlock::Quad& quad : meshed[b].quads) {
-          Index q[4];
-          for (std::size_t k = 0; k < 4; ++k) q[k] = first[quad.block[k]] + quad.vertex[k];
-          const auto& p = mesh.positions;
-          if (edges[b]) quad.along = (p[q[0]] - p[q[2]]).squaredNorm() <= (p[q[1]] - p[q[3]]).squaredNorm();
-          *out++ = quad.along ? geometry::Triangle{q[0], q[1], q[2]} : geometry::Triangle{q[0], q[1], q[3]};
-          *out++ = quad.along ? geometry::Triangle{q[0], q[2], q[3]} : geometry::Triangle{q[1], q[2], q[3]};
-        }
-      },
-      64);
-  if (last) *last = {blocks, outside, std::move(meshed), std::move(side)};
+      blocks.size(), [&](std::size_t b) { if (edges[b] && meshed[b]) triangles_of(b); }, 64);
+  if (last) *last = {blocks, outside, std::move(meshed), std::move(count), std::move(side)};
   return mesh;
 }
 

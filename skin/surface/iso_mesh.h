@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -24,14 +25,18 @@ struct MeshedBlock {
     bool along;  // split from the first corner to the third
   };
   std::vector<Quad> quads;
-  bool empty() const { return position.empty(); }
 };
 
 /// The last mesh made, block by block.
 struct MeshCache {
   Blocks blocks;
   float outside = 0;
-  std::vector<MeshedBlock> meshed;
+  std::vector<std::unique_ptr<MeshedBlock>> meshed;  ///< of blocks that the surface crosses
+  /// How many each block has, at hand: to ask the blocks themselves costs a way to memory each.
+  struct Count {
+    Index vertices = 0, quads = 0;
+  };
+  std::vector<Count> count;
   std::vector<std::int8_t> side;  ///< of each block: -1 all of it is inside, 1 outside, 0 both
 };
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <optional>
 
@@ -51,15 +52,27 @@ struct Making {
   float depth() const { return sink + 2; }  // voxels deeper than this are outside, whatever they were
 };
 
-/// The field before its shift, on some of the blocks; ground: out.
-Field make_field(const LevelSet::Impl& s, const Blocks& blocks, const Making& making, GroundField& ground) {
-  Field phi, weight;
-  if (s.rule.kernel == SurfaceKernel::kAnisotropic)
-    rasterize_anisotropic(s.particles, anisotropic_kernels(s.particles, s.rule.raster.spacing, s.rule.raster.reach, &blocks), blocks, s.rule.raster, phi, weight);
-  else
-    rasterize(s.particles, blocks, s.rule.raster, phi, weight);
-  smooth(blocks, s.outside, s.rule, weight, phi);
-  cover_particles(s.particles, blocks, s.rule.cover, weight, phi);
+/// The field as it comes from the particles. felt: blocks whose values are asked for (rasterize_anisotropic); empty: all.
+void rasterize(const LevelSet::Impl& s, const Blocks& blocks, Raster& raster, std::span<const std::uint8_t> felt = {}) {
+  if (s.rule.kernel == SurfaceKernel::kRound) return rasterize(s.particles, blocks, s.rule.raster, {}, raster);
+  Blocks asked = blocks;
+  if (!felt.empty()) {
+    std::vector<BlockCoord> coords;
+    for (std::size_t b = 0; b < blocks.size(); ++b)
+      if (felt[b]) coords.push_back(blocks.coords()[b]);
+    asked = Blocks(coords);
+  }
+  const Kernels kernels = anisotropic_kernels(s.particles, s.rule.raster.spacing, s.rule.raster.reach, &asked);
+  rasterize_anisotropic(s.particles, kernels, blocks, s.rule.raster, raster.phi, raster.weight, felt);
+}
+
+/// The field before its shift, from the particles' own, on some of the blocks; ground: out. wanted: those of them whose values are asked for;
+/// empty: all.
+Field make_field(const LevelSet::Impl& s, const Blocks& blocks, const Making& making, Field phi, const Field& weight, GroundField& ground,
+                 std::span<const std::uint8_t> wanted = {}) {
+  if (making.terrain) wanted = {};  // lifting looks around
+  smooth(blocks, s.outside, s.rule, weight, phi, wanted);
+  cover_particles(s.particles, blocks, s.rule.cover, weight, phi, wanted);
   if (!making.terrain) return phi;
   ground = sample_ground(blocks, s.particles.origin(), s.voxel, *making.terrain, std::max(2 * s.lift, making.depth()) + 1);
   Field lifted;
@@ -69,28 +82,48 @@ Field make_field(const LevelSet::Impl& s, const Blocks& blocks, const Making& ma
 
 /// The same on all blocks of s, into the cache.
 void fill_all(const LevelSet::Impl& s, const Making& making, SurfaceCache::Impl& cache) {
+  rasterize(s, s.blocks, cache.raster);
   GroundField ground;
-  cache.lifted = make_field(s, s.blocks, making, ground);
+  if (s.rule.kernel == SurfaceKernel::kRound) {
+    cache.lifted = make_field(s, s.blocks, making, cache.raster.phi, cache.raster.weight, ground);
+  } else {
+    cache.lifted = make_field(s, s.blocks, making, std::move(cache.raster.phi), cache.raster.weight, ground);
+    cache.raster = {};
+  }
   cache.distance = std::move(ground.distance);
   cache.above = std::move(ground.above);
 }
 
 /// The same on all blocks of s, in last.lifted: what is there is kept where nothing has changed. Returns what was made anew.
-Renewal renew_field(const LevelSet::Impl& s, const Making& making, SurfaceCache::Impl& last, const std::vector<std::uint64_t>& hash, const HashSet& hashes) {
+Renewal renew_field(const LevelSet::Impl& s, const Making& making, SurfaceCache::Impl& last) {
   // How far a value feels a particle, what it needs of the values around it (a voxel a step, the lift), and whether it depends on
   // what the blocks beside its own hold (sums at nodes; being deep inside).
   const int steps = smoothing_steps(s.rule.smoothing);
   const float lift = making.terrain ? 2 * s.lift + 2 : 0, beyond = static_cast<float>(steps) + lift;
-  const bool round = s.rule.kernel == SurfaceKernel::kRound, blocks_beside = !round || s.rule.raster.reach >= kFineReach;
-  const Real felt = round ? static_cast<Real>(s.reach) + (blocks_beside ? 4 : 0)
+  const bool round = s.rule.kernel == SurfaceKernel::kRound;
+  // A voxel between nodes uses those within three; whether a block is deep inside depends on nodes up to eight beyond it, and their nearest particles.
+  const Real reach = static_cast<Real>(s.reach), fine = std::max(reach + 3, kSide + static_cast<Real>(s.rule.raster.spacing));
+  const Real felt = round ? s.rule.raster.reach >= kFineReach ? fine : reach
                           : std::max<Real>(kernel_influence(s.rule.raster.spacing, s.reach), kSide + static_cast<Real>(s.rule.raster.spacing));
   const Real largest = parallel_max(s.particles.size(), 0, [&](std::size_t i) { return static_cast<Real>(s.particles.radius()[i]); });
   const Real covered = static_cast<Real>(s.rule.cover.factor) * largest + static_cast<Real>(kCoverBand + lift + s.reach);
-  Renewal renewal = find_stale(last, s.particles, hash, hashes, s.blocks, std::max(felt + static_cast<Real>(beyond), s.rule.cover.factor > 0 ? covered : 0));
-  const std::vector<std::uint8_t> needed = widened(s.blocks, renewal.stale, static_cast<int>(std::ceil(beyond / kSide)) + (blocks_beside ? 1 : 0));
+  constexpr Real kRounding = 0.01;  // [voxels] sums are of floats
+  Renewal renewal = find_stale(last, s.particles, s.blocks, std::max(felt + static_cast<Real>(beyond), s.rule.cover.factor > 0 ? covered : 0) + kRounding,
+                               reach + kRounding);
+  const std::vector<std::uint8_t> used = widened(s.blocks, renewal.stale, static_cast<int>(std::ceil(beyond / kSide))),
+                                  needed = round ? used : widened(s.blocks, used, 1);
   std::vector<BlockCoord> coords;
-  for (std::size_t b = 0; b < s.blocks.size(); ++b)
-    if (needed[b]) coords.push_back(s.blocks.coords()[b]);
+  std::vector<Index> from(s.blocks.size(), kNone);  // of each block, among the needed ones
+  std::vector<Index> whole;                         // of each of these, among all
+  std::vector<std::uint8_t> wanted, felt_in;
+  for (std::size_t b = 0; b < s.blocks.size(); ++b) {
+    if (!needed[b]) continue;
+    from[b] = static_cast<Index>(coords.size());
+    coords.push_back(s.blocks.coords()[b]);
+    whole.push_back(static_cast<Index>(b));
+    wanted.push_back(renewal.stale[b]);
+    felt_in.push_back(used[b]);
+  }
   if (coords.size() > s.blocks.size() * 2 / 3) {
     std::fill(renewal.stale.begin(), renewal.stale.end(), std::uint8_t{1});
     renewal.stale_blocks = s.blocks.size();
@@ -98,21 +131,46 @@ Renewal renew_field(const LevelSet::Impl& s, const Making& making, SurfaceCache:
     return renewal;
   }
   const Blocks part(coords);
+  Raster raster;
+  if (round) {
+    rearrange(last.raster.phi, renewal.before);
+    rearrange(last.raster.weight, renewal.before);
+    if (!last.raster.nodes.empty()) {
+      rearrange(last.raster.nodes, renewal.before, 1);
+      rearrange(last.raster.covered, renewal.before, 1);
+    }
+    rasterize(s.particles, s.blocks, s.rule.raster, renewal.rows, last.raster);
+    for (const auto& [to, all] : {std::pair(&raster.phi, &last.raster.phi), std::pair(&raster.weight, &last.raster.weight)}) {
+      to->reserve(part.size() * kVoxels);
+      for (const Index b : whole) to->insert(to->end(), &(*all)[kVoxels * b], &(*all)[kVoxels * b] + kVoxels);
+    }
+  } else {
+    rasterize(s, part, raster, felt_in);
+  }
   GroundField part_ground;
-  const Field made = make_field(s, part, making, part_ground);
+  const Field made = make_field(s, part, making, std::move(raster.phi), raster.weight, part_ground, wanted);
 
   ZONE("skin.keep");
-  const std::vector<Index> from = same_places(s.blocks, part);
-  const auto keep = [&](Field& kept, const Field& anew) {
-    rearrange(kept, renewal.before);
-    parallel_for(
-        s.blocks.size(), [&](std::size_t b) { if (renewal.stale[b]) std::copy_n(&anew[kVoxels * from[b]], kVoxels, &kept[kVoxels * b]); }, 64);
-  };
-  keep(last.lifted, made);
+  // What has come out the same is no reason to look at anything again.
+  rearrange(last.lifted, renewal.before);
   if (making.terrain) {
-    keep(last.distance, part_ground.distance);
-    keep(last.above, part_ground.above);
+    rearrange(last.distance, renewal.before);
+    rearrange(last.above, renewal.before);
   }
+  parallel_for(
+      s.blocks.size(),
+      [&](std::size_t b) {
+        if (!renewal.stale[b]) return;
+        const bool fresh = renewal.before[b] == kNone;
+        const auto keep = [&](Field& kept, const Field& anew) { std::copy_n(&anew[kVoxels * from[b]], kVoxels, &kept[kVoxels * b]); };
+        renewal.stale[b] = fresh || std::memcmp(&last.lifted[kVoxels * b], &made[kVoxels * from[b]], kVoxels * sizeof(float)) != 0;
+        if (renewal.stale[b]) keep(last.lifted, made);
+        if (fresh && making.terrain) {
+          keep(last.distance, part_ground.distance);
+          keep(last.above, part_ground.above);
+        }
+      },
+      64);
   return renewal;
 }
 
@@ -155,7 +213,10 @@ bool volume_is_known(const LevelSet::Impl& s, const Making& making, const Shift&
 Real build(LevelSet::Impl& s, const Making& making) {
   GroundField ground;
   KnownVolumes known;
-  s.phi = make_field(s, s.blocks, making, ground);
+  Raster raster;
+  rasterize(s, s.blocks, raster);
+  s.phi = make_field(s, s.blocks, making, std::move(raster.phi), raster.weight, ground);
+  raster = {};
   const Shift shift = match(s, making, s.phi, ground.above, known);
   parallel_for(
       s.blocks.size(), [&](std::size_t b) { finish(s, making, shift, s.phi, ground.distance, b, s.phi); }, 32);
@@ -165,19 +226,18 @@ Real build(LevelSet::Impl& s, const Making& making) {
 
 /// The same, with what the frame before has left in the cache, to which this one's is left. fits: something of it can be used.
 Real build_cached(LevelSet::Impl& s, const Making& making, SurfaceCache::Impl& c, bool fits) {
-  std::vector<std::uint64_t> hash = particle_hashes(s.particles);
-  HashSet hashes(hash);
   c.filled = false;  // until all of it is of one frame again
   Renewal renewal;
   KnownVolumes known;
   std::vector<std::uint8_t> beside;  // blocks whose cells may have changed
   if (fits) {
-    renewal = renew_field(s, making, c, hash, hashes);
+    renewal = renew_field(s, making, c);
     s.report.renewed = renewal.stale_blocks;
     // Cells reach into the next block; a block that is gone leaves `outside` behind.
     beside = widened(s.blocks, renewal.stale, 1);
     for (std::size_t b = 0; b < beside.size(); ++b) beside[b] |= renewal.bereft[b];
     known.last = &c.volumes;
+    known.last_range = &c.range;
     known.before = renewal.before;
     known.stale = beside;
     known.guess = c.shift;
@@ -232,10 +292,9 @@ Real build_cached(LevelSet::Impl& s, const Making& making, SurfaceCache::Impl& c
   s.frame = ++c.frame;
   s.home = c.returned;
   c.blocks = s.blocks;
-  c.x = s.particles.x();
-  c.hash = std::move(hash);
-  c.hashes = std::move(hashes);
+  c.particles = s.particles;
   c.volumes = std::move(known.now);
+  c.range = std::move(known.range);
   c.shift = shift.steps;
   c.touched = std::move(touched);
   c.filled = true;

@@ -32,7 +32,7 @@ struct LevelSetOptions {
   bool match_volume = true;  ///< shift the surface so that it encloses the particles' volume above ground
 };
 
-/// What building a level set did. The volume is matched in steps of 1/128 voxel of shift.
+/// What building a level set did. The volume is matched in steps of 1/128 voxel of shift, to 5e-4 where a step is less than that.
 struct LevelSetReport {
   std::size_t particles = 0;
   Real volume = 0;               ///< [m^3] enclosed, above ground

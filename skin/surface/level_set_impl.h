@@ -78,8 +78,9 @@ void lift_to_ground(const Blocks& blocks, float outside, float lift, const Groun
 
 /// Mean-curvature flow phi_t = kappa |grad phi| for rule.smoothing [voxels^2], in explicit steps; where W (rasterize.h) is like a
 /// lone particle's nothing moves. A voxel feels what lies within so many voxels as there are steps.
+///   wanted  blocks whose values are asked for, those of the others mean nothing then; empty: all
 int smoothing_steps(float time);
-void smooth(const Blocks& blocks, float outside, const FieldRule& rule, const Field& weight, Field& phi);
+void smooth(const Blocks& blocks, float outside, const FieldRule& rule, const Field& weight, Field& phi, std::span<const std::uint8_t> wanted = {});
 
 /// Radii of the balls round the sorted particles, rho_i below.
 ///   wanted  which are to be found, the others are 0; empty: all
@@ -91,7 +92,9 @@ std::vector<float> ball_radii(const ParticleGrid& particles, const Cover& cover,
 /// within kCoverBand of a ball; the square rounds the edge between ball and field. Where balls of different sizes meet b is that of the least
 /// |x - x_i|^2 - rho_i^2. A voxel feels particles within factor r_i + kCoverBand + R.
 ///   weight  W at the voxels
-void cover_particles(const ParticleGrid& particles, const Blocks& blocks, const Cover& cover, const Field& weight, Field& phi);
+///   wanted  blocks to be covered; empty: all
+void cover_particles(const ParticleGrid& particles, const Blocks& blocks, const Cover& cover, const Field& weight, Field& phi,
+                     std::span<const std::uint8_t> wanted = {});
 inline constexpr float kCoverBand = 2;
 
 /// Volumes of blocks that the last frame knows, by shift in steps: out, those of this frame.
@@ -101,6 +104,12 @@ struct KnownVolumes {
   std::span<const std::uint8_t> stale;   ///< or a cell of it reaches into a block that is
   int guess = 0;                         ///< the last frame's shift, in steps: where to look first
   std::map<int, std::vector<Real>> now;
+  /// Least and greatest value of each block, low > high: not looked for.
+  struct Range {
+    float low, high;
+  };
+  const std::vector<Range>* last_range = nullptr;  ///< of blocks that are not stale
+  std::vector<Range> range;
 };
 
 /// Volume [voxels] where phi < shift and above ground, phi linear in six tetrahedra a cell: what a mesh through the
@@ -111,29 +120,37 @@ Real enclosed(const Blocks& blocks, float outside, const Field& phi, const Field
 inline constexpr int kShiftSteps = 128;
 struct Shift {
   int steps = 0;     ///< of 1 / kShiftSteps voxels
-  Real exact = 0;    ///< the same, between two steps where the target is
+  Real exact = 0;    ///< the same, between steps where the target is
   Real volume = -1;  ///< [voxels] enclosed by then
   float voxels() const { return static_cast<float>(steps) / kShiftSteps; }
 };
-/// The shift within +-most, in steps of 1 / kShiftSteps, at which enclosed() is the target as nearly as such steps allow (of two the
-/// smaller one); the nearer end when there is none. The same wherever one begins to look.
+/// The shift within +-most at which enclosed() is the target; the nearer end when there is none. Of the steps no farther from there than a
+/// volume of 5e-4 of the target, and two steps, it is the roundest one (which the largest power of two divides), else the nearest: as a
+/// film's lava moves it stays for some frames, and with it the surface where nothing moves. The same wherever one begins to look.
 Shift matching_shift(const Blocks& blocks, float outside, const Field& phi, const Field& above, Real target, float most, KnownVolumes& known);
 
 /// The face-connected sets of voxels on one side of the surface, within one block.
 struct BlockPieces {
-  std::vector<std::uint16_t> of;     // of each voxel; empty: the block is one set
+  std::vector<std::uint16_t> of;     // of each voxel
   std::vector<std::uint8_t> inside;  // of each set
-  /// Along each axis: which sets meet which of the next block's; met: there is one.
-  std::array<std::vector<std::array<std::uint16_t, 2>>, 3> meeting;
-  std::array<bool, 3> met{};
-  std::uint16_t at(std::size_t voxel) const { return of.empty() ? std::uint16_t{0} : of[voxel]; }
+  /// Along each axis: which sets meet which of the next block's, and of the one before where that is whole; met: there is one.
+  struct Side {
+    std::vector<std::array<std::uint16_t, 2>> meeting;  // mine, theirs
+    bool met = false;
+  };
+  std::array<Side, 3> next, before;
+};
+/// Of all blocks. A block wholly inside or outside is one set, and has nothing here but that.
+struct Pieces {
+  std::vector<std::int8_t> side;                     // of each block: -1 inside, 1 outside, 0 both
+  std::vector<std::unique_ptr<BlockPieces>> blocks;  // of those with both
 };
 
 /// Turns inner voxels into outer ones where a face-connected set of them holds no particle (webs between particles) or is
 /// smaller than `least` [voxels], and closed bubbles smaller than that into inner ones. Returns the blocks that it changed.
 ///   last, unchanged  pieces of the last frame, left for the next; of each block whose values are those of one then, which; kNone
 std::vector<std::uint8_t> drop_pieces(const Blocks& blocks, const ParticleGrid& particles, Real least, Field& phi, LevelSetReport& report,
-                                      std::vector<BlockPieces>* last = nullptr, std::span<const Index> unchanged = {});
+                                      Pieces* last = nullptr, std::span<const Index> unchanged = {});
 
 /// Distances to the zero level of phi, right to a twentieth of a voxel beside it and a fifth three voxels away, out to +-band and cut
 /// there; the zero level stays where it is to a twentieth. Voxels without a block are outside.

@@ -17,7 +17,8 @@ namespace {
 constexpr int kMostCarried = 12;
 constexpr Real kFarthest = 1 << 20;  // [voxels] from end to end: column and block numbers fit 21 bits, floats resolve 1/16 voxel
 
-void check_input(const geometry::Points& points, Real voxel) {
+/// That holds the points.
+Box3 checked_box(const geometry::Points& points, Real voxel) {
   const std::size_t n = points.size();
   CHECK_EQ(points.radius.size(), n);
   Box3 box;
@@ -32,99 +33,125 @@ void check_input(const geometry::Points& points, Real voxel) {
                      fmt::format("spread over {:.4g} m: more than {:.0f} voxels of {:.4g} m. Wanted a larger voxel, or particles "
                                  "closer together (is one astray?)",
                                  box.sizes().maxCoeff(), kFarthest, voxel));
+  return box;
 }
 }  // namespace
 
-ParticleGrid::ParticleGrid(const geometry::Points& points, Real voxel, Real side) : side_(side) {
+ParticleGrid::ParticleGrid(const geometry::Points& points, Real voxel, Real side) {
   ZONE("skin.sort");
-  check_input(points, voxel);
+  const auto data = std::make_shared<Data>();
+  data_ = data;
+  data->side = side;
   const std::size_t n = points.size();
+  const Box3 box = checked_box(points, voxel);
   if (n == 0) return;
   CHECK_LT(n, std::size_t{kNone});
-
-  Box3 box;
-  for (const Vec3& p : points.position) box.extend(p);
   const Real block = 512 * voxel;
-  origin_ = block * (box.center() / block).array().round().matrix();
+  const Vec3 origin = data->origin = block * (box.center() / block).array().round().matrix();
 
   // Columns in the order of their first particle, their particles counted, then placed.
-  const auto local = [&](std::size_t i) -> Vec3 { return (points.position[i] - origin_) / voxel; };
+  const auto local = [&](const Vec3& p) -> Vec3 { return (p - origin) / voxel; };
   std::vector<Index> column(n);
+  std::vector<Column>& columns = data->columns;
+  // Their numbers are looked up in a table as wide as all of them where that is no waste.
+  const Vec3 lowest = local(box.min()), highest = local(box.max());
+  const int x0 = column_of(lowest.x()), y0 = column_of(lowest.y());
+  const std::size_t wide = static_cast<std::size_t>(column_of(highest.y()) - y0) + 1, deep = static_cast<std::size_t>(column_of(highest.x()) - x0) + 1;
+  std::vector<Index> numbers(wide * deep <= 4 * n ? wide * deep : 0, kNone);
   for (std::size_t i = 0; i < n; ++i) {
-    const Vec3 p = local(i);
+    const Vec3 p = local(points.position[i]);
     const int cx = column_of(p.x()), cy = column_of(p.y());
-    column[i] = table_.number(pack(cx, cy, 0));
-    if (column[i] == columns_.size()) columns_.push_back({cx, cy, 0, 0});
-    ++columns_[column[i]].end;
+    Index current;
+    if (numbers.empty()) {
+      current = data->table.number(pack(cx, cy, 0));
+    } else {
+      Index& known = numbers[static_cast<std::size_t>(cx - x0) * wide + static_cast<std::size_t>(cy - y0)];
+      if (known == kNone) known = data->table.number(pack(cx, cy, 0));
+      current = known;
+    }
+    if (current == columns.size()) columns.push_back({cx, cy, 0, 0});
+    column[i] = current;
+    ++columns[current].end;
   }
   Index sum = 0;
-  for (Column& c : columns_) {
+  for (Column& c : columns) {
     const Index count = c.end;
     c.begin = c.end = sum;
     sum += count;
   }
-  std::vector<Index> order(n);
-  for (std::size_t i = 0; i < n; ++i) order[columns_[column[i]].end++] = static_cast<Index>(i);
-
-  // By height inside a column; the other coordinates decide between equals, so that the points' order does not matter.
-  parallel_for(
-      columns_.size(),
-      [&](std::size_t c) {
-        std::sort(order.begin() + columns_[c].begin, order.begin() + columns_[c].end, [&](Index i, Index j) {
-          const Vec3 &p = points.position[i], &q = points.position[j];
-          if (p.z() != q.z()) return p.z() < q.z();
-          if (p.x() != q.x()) return p.x() < q.x();
-          if (p.y() != q.y()) return p.y() < q.y();
-          return i < j;
-        });
-      },
-      64);
+  struct Placed {
+    Vec3 position;
+    Index point;
+  };
+  std::vector<Placed> placed(n);
+  for (std::size_t i = 0; i < n; ++i) placed[columns[column[i]].end++] = {points.position[i], static_cast<Index>(i)};
 
   const auto carry = [&](std::size_t size, int width) {
     if (size == 0) return -1;
     CHECK_EQ(size, n);
-    const int offset = carried_.width;
-    carried_.width += width;
+    const int offset = data->carried.width;
+    data->carried.width += width;
     return offset;
   };
-  carried_.temperature = carry(points.temperature.size(), 1);
-  carried_.velocity = carry(points.velocity.size(), 3);
-  carried_.crust = carry(points.crust.size(), 1);
-  carried_.age = carry(points.age.size(), 1);
-  carried_.rest = carry(points.rest.size(), 3);
-  carried_.rest2 = carry(points.rest2.size(), 3);
-  CHECK_LE(carried_.width, kMostCarried);
+  Carried& carried = data->carried;
+  carried.temperature = carry(points.temperature.size(), 1);
+  carried.velocity = carry(points.velocity.size(), 3);
+  carried.crust = carry(points.crust.size(), 1);
+  carried.age = carry(points.age.size(), 1);
+  carried.rest = carry(points.rest.size(), 3);
+  carried.rest2 = carry(points.rest2.size(), 3);
+  CHECK_LE(carried.width, kMostCarried);
 
-  x_.resize(n);
-  radius_.resize(n);
-  values_.resize(n * static_cast<std::size_t>(carried_.width));
-  parallel_for(n, [&](std::size_t s) {
-    const std::size_t i = order[s];
-    x_[s] = local(i);
-    radius_[s] = static_cast<float>(points.radius[i] / voxel);
-    float* v = values_.data() + s * static_cast<std::size_t>(carried_.width);
-    const auto put = [&](int offset, Real value) {
-      if (offset >= 0) v[offset] = static_cast<float>(value);
+  data->x.resize(n);
+  data->radius.resize(n);
+  data->values.resize(n * static_cast<std::size_t>(carried.width));
+  const auto take = [&](std::size_t s) {
+    const std::size_t i = placed[s].point;
+    data->x[s] = local(placed[s].position);
+    data->radius[s] = static_cast<float>(points.radius[i] / voxel);
+    float* v = data->values.data() + s * static_cast<std::size_t>(carried.width);
+    const auto put = [&](int offset, std::span<const Real> value) {
+      if (offset >= 0) v[offset] = static_cast<float>(value[i]);
     };
     const auto put3 = [&](int offset, std::span<const Vec3> value) {
       for (int a = 0; a < 3; ++a)
         if (offset >= 0) v[offset + a] = static_cast<float>(value[i][a]);
     };
-    put(carried_.temperature, carried_.temperature < 0 ? 0 : points.temperature[i]);
-    put3(carried_.velocity, points.velocity);
-    put(carried_.crust, carried_.crust < 0 ? 0 : points.crust[i]);
-    put(carried_.age, carried_.age < 0 ? 0 : points.age[i]);
-    put3(carried_.rest, points.rest);
-    put3(carried_.rest2, points.rest2);
-  });
+    put(carried.temperature, points.temperature);
+    put3(carried.velocity, points.velocity);
+    put(carried.crust, points.crust);
+    put(carried.age, points.age);
+    put3(carried.rest, points.rest);
+    put3(carried.rest2, points.rest2);
+  };
+  // By height inside a column; the other coordinates decide between equals, so that the points' order does not matter.
+  parallel_for(
+      columns.size(),
+      [&](std::size_t c) {
+        const auto first = placed.begin() + columns[c].begin, end = placed.begin() + columns[c].end;
+        const auto lower = [](const Placed& a, const Placed& b) {
+          const Vec3 &p = a.position, &q = b.position;
+          if (p.z() != q.z()) return p.z() < q.z();
+          if (p.x() != q.x()) return p.x() < q.x();
+          if (p.y() != q.y()) return p.y() < q.y();
+          return a.point < b.point;
+        };
+        if (!std::is_sorted(first, end, lower)) std::sort(first, end, lower);  // particles born in rows are
+        for (std::size_t s = columns[c].begin; s < columns[c].end; ++s) take(s);
+      },
+      64);
 }
 
-int ParticleGrid::column_of(Real v) const { return static_cast<int>(std::floor(v / side_)); }
+int ParticleGrid::column_of(Real v) const {
+  const Real columns = v / data_->side;
+  const int towards_zero = static_cast<int>(columns);  // std::floor is a call, this one of the program's hottest
+  return towards_zero - (columns < towards_zero);
+}
 
 Index ParticleGrid::first_above(const Column& column, Real z) const {
-  const auto first =
-      std::upper_bound(x_.begin() + column.begin, x_.begin() + column.end, z, [](Real height, const Vec3& p) { return height < p.z(); });
-  return static_cast<Index>(first - x_.begin());
+  const std::vector<Vec3>& x = data_->x;
+  const auto first = std::upper_bound(x.begin() + column.begin, x.begin() + column.end, z, [](Real height, const Vec3& p) { return height < p.z(); });
+  return static_cast<Index>(first - x.begin());
 }
 
 namespace {
@@ -171,7 +198,8 @@ EFFUSE_CLONES bool weighted_mean(const Nearby& near, float x, float y, float z, 
 }  // namespace
 
 void ParticleGrid::average(std::span<const Vec3> points, Real reach, std::span<float> out) const {
-  const std::size_t width = static_cast<std::size_t>(carried_.width);
+  const std::size_t width = static_cast<std::size_t>(carried().width);
+  const std::vector<Vec3>& x = data_->x;
   CHECK_EQ(out.size(), points.size() * width);
   if (width == 0 || points.empty()) return;
   CHECK(size() > 0);
@@ -205,11 +233,11 @@ void ParticleGrid::average(std::span<const Vec3> points, Real reach, std::span<f
         Index first = kNone;
         runs(low - Vec3::Constant(r), box.max() + Vec3::Constant(r), [&](Index from, Index to) {
           for (Index i = from; i < to; ++i) {
-            if (box.squaredExteriorDistance(x_[i]) >= r * r) continue;
+            if (box.squaredExteriorDistance(x[i]) >= r * r) continue;
             if (first == kNone) first = i;
-            near.x.push_back(static_cast<float>(x_[i].x() - low.x()));
-            near.y.push_back(static_cast<float>(x_[i].y() - low.y()));
-            near.z.push_back(static_cast<float>(x_[i].z() - low.z()));
+            near.x.push_back(static_cast<float>(x[i].x() - low.x()));
+            near.y.push_back(static_cast<float>(x[i].y() - low.y()));
+            near.z.push_back(static_cast<float>(x[i].z() - low.z()));
             Carry& v = near.values.emplace_back();
             for (std::size_t a = 0; a < width; ++a) v[a] = values(i)[a] - values(first)[a];
           }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "geometry/base/check.h"
 #include "geometry/base/parallel.h"
 #include "geometry/base/zones.h"
 #include "skin/surface/clones.h"
@@ -38,13 +39,14 @@ struct Narrowed {
 
 using Row = float __attribute__((vector_size(kSide * sizeof(float))));
 
-/// The field on the 512 voxels of one block. The sums run over the candidates in their order.
-EFFUSE_CLONES void gather_block(const Candidates& near, Narrowed& slab, Narrowed& row, const RasterOptions& o, float* phi, float* weight) {
+/// The field on these rows of one block. The sums run over the candidates in their order.
+EFFUSE_CLONES void gather_block(const Candidates& near, RowSet rows, Narrowed& slab, Narrowed& row, const RasterOptions& o, float* phi, float* weight) {
   const float R2 = o.reach * o.reach, inverse_R2 = 1 / R2;
   const Row zero{}, lane = {0, 1, 2, 3, 4, 5, 6, 7};
   const std::size_t n = near.size();
 
   for (int i = 0; i < kSide; ++i) {
+    if ((rows >> (8 * i) & 255u) == 0) continue;
     std::size_t in_slab = 0;
     for (std::size_t c = 0; c < n; ++c) {
       const float dx = near.x[c] - static_cast<float>(i), d2 = dx * dx;
@@ -56,6 +58,7 @@ EFFUSE_CLONES void gather_block(const Candidates& near, Narrowed& slab, Narrowed
       in_slab += d2 < R2;
     }
     for (int j = 0; j < kSide; ++j) {
+      if ((rows >> (8 * i + j) & 1u) == 0) continue;
       std::size_t in_row = 0;
       for (std::size_t c = 0; c < in_slab; ++c) {
         const float dy = slab.dy[c] - static_cast<float>(j), d2 = slab.d2[c] + dy * dy;
@@ -97,22 +100,32 @@ EFFUSE_CLONES void gather_block(const Candidates& near, Narrowed& slab, Narrowed
 
 // Finer voxels: sums on every second one, cubic between.
 
-constexpr int kNodes = kSide / 2;  // along a block's side
-constexpr std::size_t kBlockNodes = kNodes * kNodes * kNodes;
 /// A point this near to a particle [spacings] is in lava or beside it: holes of dense packings are 0.87 wide.
 constexpr float kCovered = 1;
 
-/// W, sum w x, sum w r and the squared distance of the nearest particle at a block's nodes; x from the block's voxel (0, 0, 0).
-struct NodeSums {
-  std::array<float, kBlockNodes> W, x, y, z, r, nearest;
-};
+/// Rows of nodes (i, j, .) of a block: bit 4 i + j.
+using NodeRows = std::uint16_t;
+NodeRows node_rows(RowSet rows) {
+  unsigned set = 0;
+  for (unsigned r = 0; r < 16; ++r) set |= static_cast<unsigned>(rows >> (16 * (r / 4) + 2 * (r % 4)) & 1u) << r;
+  return static_cast<NodeRows>(set);
+}
+/// Of the block at slot (0..26, as Blocks::around), those that the one in the middle interpolates between: all of its own, the last before it,
+/// the first two beyond.
+NodeRows rows_used(std::size_t slot) {
+  const auto used = [](std::size_t step, unsigned node) { return step == 0 ? node == 3 : step == 1 || node < 2; };
+  unsigned set = 0;
+  for (unsigned r = 0; r < 16; ++r) set |= used(slot / 9, r / 4) && used(slot / 3 % 3, r % 4) ? 1u << r : 0u;
+  return static_cast<NodeRows>(set);
+}
 
 /// Two rows of four nodes at a time.
-EFFUSE_CLONES void gather_nodes(const Candidates& near, Narrowed& slab, const RasterOptions& o, NodeSums& out) {
+EFFUSE_CLONES void gather_nodes(const Candidates& near, NodeRows rows, Narrowed& slab, const RasterOptions& o, NodeSums& out) {
   const float R2 = o.reach * o.reach, inverse_R2 = 1 / R2;
   const Row zero{}, lane_y = {0, 0, 0, 0, 2, 2, 2, 2}, lane_z = {0, 2, 4, 6, 0, 2, 4, 6};
   const std::size_t n = near.size();
-  for (int i = 0; i < kNodes; ++i) {
+  for (int i = 0; i < kNodesAlong; ++i) {
+    if ((rows >> (4 * i) & 15u) == 0) continue;
     std::size_t in_slab = 0;
     for (std::size_t c = 0; c < n; ++c) {
       const float dx = near.x[c] - static_cast<float>(2 * i), d2 = dx * dx;
@@ -123,7 +136,8 @@ EFFUSE_CLONES void gather_nodes(const Candidates& near, Narrowed& slab, const Ra
       slab.r[in_slab] = near.r[c];
       in_slab += d2 < R2;
     }
-    for (int j = 0; j < kNodes; j += 2) {
+    for (int j = 0; j < kNodesAlong; j += 2) {
+      if ((rows >> (4 * i + j) & 3u) == 0) continue;
       Row W = zero, wx = zero, wy = zero, wz = zero, wr = zero, nearest = zero + R2;
       const float low = static_cast<float>(2 * j), high = low + 2;
       const Row at_y = lane_y + low;
@@ -142,7 +156,7 @@ EFFUSE_CLONES void gather_nodes(const Candidates& near, Narrowed& slab, const Ra
         nearest = d2 < nearest ? d2 : nearest;
       }
       for (int k = 0; k < 8; ++k) {
-        const std::size_t node = static_cast<std::size_t>((i * kNodes + j) * kNodes + k);
+        const std::size_t node = static_cast<std::size_t>((i * kNodesAlong + j) * kNodesAlong + k);
         out.W[node] = W[k];
         out.x[node] = wx[k];
         out.y[node] = wy[k];
@@ -167,14 +181,14 @@ void collect(const Blocks& blocks, const std::vector<NodeSums>& nodes, float rea
       const std::size_t row = static_cast<std::size_t>((i + 1) * NodesAround::kWide + j + 1);
       for (int k = -1; k < NodesAround::kWide; ++k) {
         const std::size_t lane = static_cast<std::size_t>(k + 1);
-        const int da = i < 0 ? -1 : i / kNodes, db = j < 0 ? -1 : j / kNodes, dc = k < 0 ? -1 : k / kNodes;
+        const int da = i < 0 ? -1 : i / kNodesAlong, db = j < 0 ? -1 : j / kNodesAlong, dc = k < 0 ? -1 : k / kNodesAlong;
         const Index block = k == NodesAround::kWide - 1 ? kNone : blocks.around(b)[static_cast<std::size_t>((da + 1) * 9 + (db + 1) * 3 + dc + 1)];
         if (block == kNone) {
           for (auto& sum : out.sums) sum[row][lane] = 0;
           out.nearest[row][lane] = reach;
           continue;
         }
-        const std::size_t node = static_cast<std::size_t>(((i & 3) * kNodes + (j & 3)) * kNodes + (k & 3));
+        const std::size_t node = static_cast<std::size_t>(((i & 3) * kNodesAlong + (j & 3)) * kNodesAlong + (k & 3));
         const NodeSums& from = nodes[block];
         const float W = from.W[node], side = kSide;
         out.sums[0][row][lane] = W;
@@ -200,20 +214,20 @@ EFFUSE_CLONES void interpolate(const NodesAround& nodes, std::array<std::array<R
   std::array<float, 8> z;
   for (std::size_t f = 0; f < 5; ++f) {
     const auto& in = nodes.sums[f];
-    for (std::size_t q = 0; q < kNodes; ++q)
+    for (std::size_t q = 0; q < kNodesAlong; ++q)
       for (std::size_t j = 0; j < kWide; ++j) {
         along_x[2 * q * kWide + j] = in[(q + 1) * kWide + j];
         middle(in[q * kWide + j], in[(q + 1) * kWide + j], in[(q + 2) * kWide + j], in[(q + 3) * kWide + j], along_x[(2 * q + 1) * kWide + j]);
       }
     for (std::size_t i = 0; i < kSide; ++i)
-      for (std::size_t q = 0; q < kNodes; ++q) {
+      for (std::size_t q = 0; q < kNodesAlong; ++q) {
         const Row* in_y = &along_x[i * kWide + q];
         Row rows[2] = {in_y[1], in_y[1]};
         middle(in_y[0], in_y[1], in_y[2], in_y[3], rows[1]);
         for (std::size_t h = 0; h < 2; ++h) {
           Row& to = out[f][i * kSide + 2 * q + h];
           std::memcpy(z.data(), &rows[h], sizeof(Row));
-          for (std::size_t k = 0; k < kNodes; ++k) {
+          for (std::size_t k = 0; k < kNodesAlong; ++k) {
             to[2 * k] = z[k + 1];
             float between = 0;
             middle(z[k], z[k + 1], z[k + 2], z[k + 3], between);
@@ -288,42 +302,56 @@ void candidates(const ParticleGrid& particles, const BlockCoord& coord, Real rea
   });
 }
 
-void rasterize_fine(const ParticleGrid& particles, const Blocks& blocks, const RasterOptions& o, Field& phi, Field& weight) {
-  std::vector<NodeSums> nodes(blocks.size());
-  std::vector<std::uint8_t> covered(blocks.size(), 0);
+void rasterize_fine(const ParticleGrid& particles, const Blocks& blocks, const RasterOptions& o, std::span<const RowSet> rows, Raster& raster) {
+  const std::size_t n = blocks.size();
+  raster.nodes.resize(n);
+  raster.covered.resize(n);
+  std::vector<NodeRows> anew(n, 0xffff);
+  std::vector<std::uint8_t> uncertain(n, 0);  // whether it is covered has changed
   const float covered2 = kCovered * o.spacing * kCovered * o.spacing;
-  parallel_ranges(blocks.size(), 8, [&](std::size_t begin, std::size_t end) {
+  parallel_ranges(n, 8, [&](std::size_t begin, std::size_t end) {
     Candidates near;
     Narrowed slab;
     for (std::size_t b = begin; b < end; ++b) {
+      if (!rows.empty() && (anew[b] = node_rows(rows[b])) == 0) continue;
       candidates(particles, blocks.coords()[b], o.reach, near);
       slab.resize(near.size() + 1);
-      gather_nodes(near, slab, o, nodes[b]);
-      covered[b] = *std::max_element(nodes[b].nearest.begin(), nodes[b].nearest.end()) < covered2;
+      NodeSums& sums = raster.nodes[b];
+      gather_nodes(near, anew[b], slab, o, sums);
+      const std::uint8_t covered = *std::max_element(sums.nearest.begin(), sums.nearest.end()) < covered2;
+      uncertain[b] = covered != raster.covered[b];
+      raster.covered[b] = covered;
     }
   });
-  parallel_ranges(blocks.size(), 8, [&](std::size_t begin, std::size_t end) {
+  std::array<NodeRows, 27> used;
+  for (std::size_t slot = 0; slot < 27; ++slot) used[slot] = rows_used(slot);
+  parallel_ranges(n, 8, [&](std::size_t begin, std::size_t end) {
     Candidates near;
     NodesAround around;
     for (std::size_t b = begin; b < end; ++b) {
-      float* out = &phi[b * kVoxels];
       const auto& beside = blocks.around(b);
-      const float W = *std::max_element(nodes[b].W.begin(), nodes[b].W.end());
-      if (W == 0) {
+      if (!rows.empty()) {
+        bool changed = rows[b] == ~RowSet{0};
+        for (std::size_t slot = 0; slot < 27 && !changed; ++slot) changed = beside[slot] != kNone && ((anew[beside[slot]] & used[slot]) != 0 || uncertain[beside[slot]]);
+        if (!changed) continue;
+      }
+      float *out = &raster.phi[b * kVoxels], *weight = &raster.weight[b * kVoxels];
+      const NodeSums& own = raster.nodes[b];
+      if (*std::max_element(own.W.begin(), own.W.end()) == 0) {
         std::fill_n(out, kVoxels, o.outside);
-        std::fill_n(&weight[b * kVoxels], kVoxels, 0.0f);
-      } else if (std::all_of(beside.begin(), beside.end(), [&](Index k) { return k != kNone && covered[k]; })) {
+        std::fill_n(weight, kVoxels, 0.0f);
+      } else if (std::all_of(beside.begin(), beside.end(), [&](Index k) { return k != kNone && raster.covered[k]; })) {
         // Two spacings from the next gap: deep inside.
-        std::fill_n(out, kVoxels, -o.radius_factor * nodes[b].r[0] / nodes[b].W[0]);
-        std::fill_n(&weight[b * kVoxels], kVoxels, nodes[b].W[0]);
+        std::fill_n(out, kVoxels, -o.radius_factor * own.r[0] / own.W[0]);
+        std::fill_n(weight, kVoxels, own.W[0]);
       } else {
-        collect(blocks, nodes, o.reach, b, around);
+        collect(blocks, raster.nodes, o.reach, b, around);
         near.clear();
         const auto found = [&]() -> const Candidates& {
           if (near.size() == 0) candidates(particles, blocks.coords()[b], o.reach, near);
           return near;
         };
-        field_from_nodes(around, o, found, out, &weight[b * kVoxels]);
+        field_from_nodes(around, o, found, out, weight);
       }
     }
   });
@@ -331,27 +359,39 @@ void rasterize_fine(const ParticleGrid& particles, const Blocks& blocks, const R
 
 }  // namespace
 
-void rasterize(const ParticleGrid& particles, const Blocks& blocks, const RasterOptions& options, Field& phi, Field& weight) {
+void rasterize(const ParticleGrid& particles, const Blocks& blocks, const RasterOptions& options, std::span<const RowSet> rows, Raster& raster) {
   ZONE("skin.rasterize");
-  phi.resize(blocks.size() * kVoxels);
-  weight.resize(blocks.size() * kVoxels);
-  if (options.reach >= kFineReach) return rasterize_fine(particles, blocks, options, phi, weight);
+  CHECK(rows.empty() || rows.size() == blocks.size());
+  raster.phi.resize(blocks.size() * kVoxels);
+  raster.weight.resize(blocks.size() * kVoxels);
+  if (options.reach >= kFineReach) return rasterize_fine(particles, blocks, options, rows, raster);
   parallel_ranges(blocks.size(), 8, [&](std::size_t begin, std::size_t end) {
     Candidates near;
     Narrowed slab, row;
     for (std::size_t b = begin; b < end; ++b) {
+      const RowSet anew = rows.empty() ? ~RowSet{0} : rows[b];
+      if (anew == 0) continue;
       candidates(particles, blocks.coords()[b], options.reach, near);
       if (near.size() == 0) {
-        std::fill_n(&phi[b * kVoxels], kVoxels, options.outside);
-        std::fill_n(&weight[b * kVoxels], kVoxels, 0.0f);
+        std::fill_n(&raster.phi[b * kVoxels], kVoxels, options.outside);
+        std::fill_n(&raster.weight[b * kVoxels], kVoxels, 0.0f);
         continue;
       }
       // One more than can be kept: the narrowing writes before it decides.
       slab.resize(near.size() + 1);
       row.resize(near.size() + 1);
-      gather_block(near, slab, row, options, &phi[b * kVoxels], &weight[b * kVoxels]);
+      gather_block(near, anew, slab, row, options, &raster.phi[b * kVoxels], &raster.weight[b * kVoxels]);
     }
   });
+}
+
+void rasterize(const ParticleGrid& particles, const Blocks& blocks, const RasterOptions& options, Field& phi, Field& weight) {
+  Raster raster;
+  raster.phi.swap(phi);
+  raster.weight.swap(weight);
+  rasterize(particles, blocks, options, {}, raster);
+  phi.swap(raster.phi);
+  weight.swap(raster.weight);
 }
 
 Real zhu_bridson(const ParticleGrid& particles, const RasterOptions& options, const Vec3& p) {

@@ -1,6 +1,10 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <optional>
+#include <span>
+#include <vector>
 
 #include "skin/surface/blocks.h"
 #include "skin/surface/particle_grid.h"
@@ -35,6 +39,29 @@ Blocks blocks_around(const ParticleGrid& particles, Real reach);
 /// Blocks that lie two spacings and more from any point without a particle within one spacing are filled with one value.
 /// Same bits on any number of threads and any order of the points.
 void rasterize(const ParticleGrid& particles, const Blocks& blocks, const RasterOptions& options, Field& phi, Field& weight);
+
+/// Of a block at every second voxel, four along each side: W, sum w x (x from the block's voxel (0, 0, 0)), sum w r, and the squared
+/// distance of the nearest particle, at most reach^2.
+inline constexpr int kNodesAlong = kSide / 2;
+struct NodeSums {
+  std::array<float, kNodesAlong * kNodesAlong * kNodesAlong> W, x, y, z, r, nearest;
+};
+
+/// The field, and what it takes to make parts of it anew.
+struct Raster {
+  Field phi, weight;
+  std::vector<NodeSums> nodes;        ///< of each block, from kFineReach on
+  std::vector<std::uint8_t> covered;  ///< of each block, from kFineReach on: particles lie near all its nodes
+};
+
+/// Rows of voxels of a block: bit 8 i + j is row (i, j, .).
+using RowSet = std::uint64_t;
+
+/// rasterize(), into a Raster; with rows, that of the same blocks and other particles, of which every row that a particle of one of the two
+/// alone is felt in is among `rows`, all of a block that was none before: the same bits as of all rows.
+///   rows    of each block; empty: all of all
+///   raster  in, out
+void rasterize(const ParticleGrid& particles, const Blocks& blocks, const RasterOptions& options, std::span<const RowSet> rows, Raster& raster);
 
 /// The same at one point, in double, over all particles: the twin that tests compare with.
 Real zhu_bridson(const ParticleGrid& particles, const RasterOptions& options, const Vec3& p);

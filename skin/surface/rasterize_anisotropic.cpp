@@ -213,9 +213,10 @@ std::vector<std::uint8_t> deep_blocks(const ParticleGrid& particles, const Block
 }  // namespace
 
 void rasterize_anisotropic(const ParticleGrid& particles, const Kernels& kernels, const Blocks& blocks, const RasterOptions& o, Field& phi,
-                           Field& weight) {
+                           Field& weight, std::span<const std::uint8_t> wanted) {
   ZONE("skin.rasterize");
   CHECK_EQ(kernels.centre.size(), particles.size());
+  CHECK(wanted.empty() || wanted.size() == blocks.size());
   phi.resize(blocks.size() * kVoxels);
   weight.resize(blocks.size() * kVoxels);
   const float cut = kBound * o.spacing + o.outside / kBoundSlope;  // farther from any particle the field is `outside`
@@ -232,6 +233,7 @@ void rasterize_anisotropic(const ParticleGrid& particles, const Kernels& kernels
     SumRows sums;
     Rows nearest;
     for (std::size_t b = begin; b < end; ++b) {
+      if (!wanted.empty() && !wanted[b]) continue;
       if (deep[b]) {
         std::fill_n(&phi[b * kVoxels], kVoxels, -o.radius_factor * o.spacing / 2);
         std::fill_n(&weight[b * kVoxels], kVoxels, full);

@@ -1,7 +1,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <memory>
 
+#include "geometry/base/check.h"
 #include "geometry/base/parallel.h"
 #include "geometry/base/zones.h"
 #include "skin/surface/clones.h"
@@ -65,21 +67,43 @@ float smoothing_share(const FieldRule& rule, float W) {
   return ramp * ramp * (3 - 2 * ramp);
 }
 
-void smooth(const Blocks& blocks, float outside, const FieldRule& rule, const Field& weight, Field& phi) {
+void smooth(const Blocks& blocks, float outside, const FieldRule& rule, const Field& weight, Field& phi, std::span<const std::uint8_t> wanted) {
   ZONE("skin.smooth");
+  CHECK(wanted.empty() || wanted.size() == blocks.size());
   const int steps = smoothing_steps(rule.smoothing);
   const float dt = steps > 0 ? rule.smoothing / static_cast<float>(steps) : 0;
+  // Rows that a wanted block feels in the steps after the first, across x and y.
+  const auto rows_of = [&](std::size_t b) {
+    RowSet rows = wanted.empty() || wanted[b] || steps > kSide ? ~RowSet{0} : 0;
+    const int unfelt = std::max(0, kSide + 1 - steps);  // of a block's eight layers
+    const auto felt = [&](std::size_t step) { return step == 0 ? 255u >> unfelt : step == 1 ? 255u : 255u << unfelt & 255u; };
+    for (std::size_t slot = 0; slot < 27 && ~rows != 0; ++slot) {
+      const Index other = blocks.around(b)[slot];
+      if (other == kNone || !wanted[other]) continue;
+      for (int i = 0; i < kSide; ++i)
+        if (felt(slot / 9) >> i & 1u) rows |= RowSet{felt(slot / 3 % 3)} << (kSide * i);
+    }
+    return rows;
+  };
 
-  Field rate(steps > 0 ? phi.size() : 0), next = steps > 0 ? phi : Field{};
+  if (steps == 0) return;
+
+  const std::unique_ptr<float[]> rate = std::make_unique_for_overwrite<float[]>(phi.size());  // of blocks that have rows
+  Field next = phi;
+  std::vector<RowSet> rows(blocks.size());
+  std::vector<std::uint8_t> rated(blocks.size(), 0);
   for (int step = 0; step < steps; ++step) {
     parallel_for(
         blocks.size(),
         [&](std::size_t b) {
           const float* old = &phi[b * kVoxels];
-          if (step == 0)
-            for (std::size_t v = 0; v < kVoxels; ++v) rate[b * kVoxels + v] = smoothing_share(rule, weight[b * kVoxels + v]) * dt;
+          if (step == 0) rows[b] = rows_of(b);
+          if (rows[b] == 0) return;
           // A block without the band is the same in both fields.
           if (std::none_of(old, old + kVoxels, [](float v) { return std::abs(v) < kBand; })) return;
+          if (!rated[b])
+            for (std::size_t v = 0; v < kVoxels; ++v) rate[b * kVoxels + v] = rows[b] >> (v / kSide) & 1u ? smoothing_share(rule, weight[b * kVoxels + v]) * dt : 0;
+          rated[b] = 1;
           float p[1000];
           blocks.padded(phi, outside, b, p);
           std::memcpy(&next[b * kVoxels], old, kVoxels * sizeof(float));

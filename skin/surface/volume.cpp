@@ -1,6 +1,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
+#include <set>
+#include <span>
+#include <vector>
 
 #include "geometry/base/parallel.h"
 #include "geometry/base/zones.h"
@@ -49,34 +53,63 @@ EFFUSE_CLONES void corner_sums(float* v) {
   for (std::size_t i = 0; i < 900; ++i) v[i] += v[i + 100];
 }
 
+constexpr int kStrides = 8;            // between no shift and the farthest; the volume between two of them is nearly linear
+constexpr Real kVolumeError = 5e-4;    // of the target: by so much a round shift may miss
+constexpr Real kMostOff = 2;           // [steps] and by so much, lest it be seen to change
+
 /// Volumes enclosed by one field at different shifts.
 class Enclosed {
  public:
+  using Range = KnownVolumes::Range;
   Enclosed(const Blocks& blocks, float outside, const Field& phi, const Field& above)
       : blocks_(blocks), outside_(outside), phi_(phi), above_(above), range_(blocks.size(), {1, 0}), full_(blocks.size(), -1) {}
+  /// Ranges that the last frame knows.
+  void take_ranges(const KnownVolumes& known) {
+    if (!known.last_range || known.last_range->empty()) return;
+    for (std::size_t b = 0; b < range_.size(); ++b)
+      if (!known.stale[b]) range_[b] = (*known.last_range)[known.before[b]];
+  }
+  std::vector<Range> ranges() && { return std::move(range_); }
   Real operator()(float shift) {
     find_ranges([](std::size_t) { return true; });
     return parallel_sum(
-        blocks_.size(), Real{0}, [&](std::size_t b) { return of_block(b, shift); }, 32);
+        blocks_.size(), Real{0},
+        [&](std::size_t b) {
+          Values values;
+          return of_block(b, shift, values);
+        },
+        32);
   }
-  /// At a shift in steps; blocks that the last frame knows are not looked at.
-  Real operator()(int steps, KnownVolumes& known) {
-    const std::vector<Real>* last = nullptr;
-    if (known.last)
-      if (const auto at = known.last->find(steps); at != known.last->end()) last = &at->second;
-    const auto asked = [&](std::size_t b) { return !last || known.stale[b]; };
-    find_ranges(asked);
-    std::vector<Real>& now = known.now[steps];
-    now.resize(blocks_.size());
-    const float shift = static_cast<float>(steps) / kShiftSteps;
-    return parallel_sum(
-        blocks_.size(), Real{0}, [&](std::size_t b) { return now[b] = asked(b) ? of_block(b, shift) : (*last)[known.before[b]]; }, 32);
+  /// At shifts in steps; blocks that the last frame knows are not looked at.
+  std::vector<Real> operator()(std::span<const int> steps, KnownVolumes& known) {
+    struct Asked {
+      float shift;
+      const std::vector<Real>* last;
+      std::vector<Real>* now;
+    };
+    std::vector<Asked> asked;
+    bool all = false;
+    for (const int k : steps) {
+      const bool is_known = known.last && known.last->contains(k);
+      std::vector<Real>& now = known.now[k];
+      now.resize(blocks_.size());
+      asked.push_back({static_cast<float>(k) / kShiftSteps, is_known ? &known.last->at(k) : nullptr, &now});
+      all = all || !is_known;
+    }
+    find_ranges([&](std::size_t b) { return all || known.stale[b]; });
+    parallel_for(
+        blocks_.size(),
+        [&](std::size_t b) {
+          Values values;
+          for (const Asked& a : asked) (*a.now)[b] = a.last && !known.stale[b] ? (*a.last)[known.before[b]] : of_block(b, a.shift, values);
+        },
+        32);
+    std::vector<Real> sums;
+    for (const Asked& a : asked) sums.push_back(parallel_sum(blocks_.size(), Real{0}, [&](std::size_t b) { return (*a.now)[b]; }, 32));
+    return sums;
   }
 
  private:
-  struct Range {
-    float low, high;  // low > high: not looked for yet
-  };
   static constexpr std::size_t kBeyond[7] = {14, 16, 17, 22, 23, 25, 26};  // where a block's cells reach
 
   /// Of the blocks asked for and those that their cells reach into.
@@ -99,8 +132,13 @@ class Enclosed {
         64);
   }
 
+  /// Of a block and those its cells reach into, once they are asked for; the share above ground eight times.
+  struct Values {
+    bool there = false;
+    float p[1000], open[1000];
+  };
   /// Of the cells that begin at the block's voxels.
-  Real of_block(std::size_t b, float shift) {
+  Real of_block(std::size_t b, float shift, Values& values) {
     Range range = range_[b];
     for (const std::size_t slot : kBeyond) {
       const Index other = blocks_.around(b)[slot];
@@ -111,14 +149,18 @@ class Enclosed {
     const bool whole = range.high < shift;
     if (whole && above_.empty()) return kVoxels;
     if (whole && full_[b] >= 0) return full_[b];
-    float p[1000], inside[1000], open[1000];
-    blocks_.padded(phi_, outside_, b, p);
+    if (!values.there) {
+      blocks_.padded(phi_, outside_, b, values.p);
+      if (!above_.empty()) {
+        blocks_.padded(above_, 1, b, values.open);
+        corner_sums(values.open);
+      }
+      values.there = true;
+    }
+    const float *p = values.p, *open = values.open;
+    float inside[1000];
     for (std::size_t v = 0; v < 1000; ++v) inside[v] = p[v] < shift ? 1.0f : 0.0f;
     corner_sums(inside);
-    if (!above_.empty()) {
-      blocks_.padded(above_, 1, b, open);
-      corner_sums(open);
-    }
     float sum = 0;  // at most 512, of terms at most 1
     for (int i = 1; i <= kSide; ++i)
       for (int j = 1; j <= kSide; ++j)
@@ -146,57 +188,114 @@ Real enclosed(const Blocks& blocks, float outside, const Field& phi, const Field
 }
 
 Real enclosed(const Blocks& blocks, float outside, const Field& phi, const Field& above, KnownVolumes& known) {
-  return Enclosed(blocks, outside, phi, above)(0, known);
+  return Enclosed(blocks, outside, phi, above)(std::array{0}, known).front();
 }
+
+namespace {
+
+/// The number between a and b, a <= b, that the largest power of two divides.
+int roundest(int a, int b) {
+  if (a <= 0 && b >= 0) return 0;
+  if (b < 0) return -roundest(-b, -a);
+  int power = 1;
+  while ((a + 2 * power - 1) / (2 * power) * 2 * power <= b) power *= 2;
+  return (a + power - 1) / power * power;
+}
+
+}  // namespace
 
 Shift matching_shift(const Blocks& blocks, float outside, const Field& phi, const Field& above, Real target, float most, KnownVolumes& known) {
   ZONE("skin.match_volume");
   Enclosed volume(blocks, outside, phi, above);
-  const auto excess = [&](int k) { return volume(k, known) / target - 1; };
-  // The volume rises with the shift (it may jump: pieces, thin sheets), so there is one pair of neighbouring steps between which it passes
-  // the target, wherever the search begins. Out by steps that double until the target lies between, then regula falsi with the
-  // weight of an end that stays halved (Illinois).
-  const int end = static_cast<int>(most * kShiftSteps), first = std::clamp(known.guess, -end, end);
-  int low = first, high = first;
-  Real at_low = excess(first), at_high = at_low;
-  const bool outward = at_low < 0;
-  for (int step = known.last ? 1 : std::max(1, end / 8); outward ? at_high < 0 && high < end : at_low >= 0 && low > -end; step *= 2) {
-    if (outward) {
-      low = high;
-      at_low = at_high;
-      high = std::min(end, high + step);
-      at_high = excess(high);
-    } else {
-      high = low;
-      at_high = at_low;
-      low = std::max(-end, low - step);
-      at_low = excess(low);
-    }
-  }
-  Real weight_low = at_low, weight_high = at_high;
-  int stayed = 0;
-  while (high - low > 1 && at_low < 0 && at_high >= 0) {
-    const int middle = std::clamp(static_cast<int>(std::floor(low - weight_low * (high - low) / (weight_high - weight_low))), low + 1, high - 1);
-    const Real at_middle = excess(middle);
-    if (at_middle < 0) {
-      low = middle;
-      weight_low = at_low = at_middle;
-      if (stayed > 0) weight_high /= 2;
-      stayed = 1;
-    } else {
-      high = middle;
-      weight_high = at_high = at_middle;
-      if (stayed < 0) weight_low /= 2;
-      stayed = -1;
-    }
-  }
-  const bool lower = at_low >= 0 || (at_high >= 0 && -at_low <= at_high);
-  // Steps beside these are kept known: the next frame may want them.
+  volume.take_ranges(known);
+  std::map<int, Real> found;
+  std::set<int> asked;
+  const auto look = [&](std::span<const int> steps) {
+    const std::vector<Real> volumes = volume(steps, known);
+    for (std::size_t k = 0; k < volumes.size(); ++k) found[steps[k]] = volumes[k] / target - 1;
+  };
+  const auto excess = [&](int k) {
+    if (asked.insert(k).second && !found.contains(k)) look(std::array{k});
+    return found[k];
+  };
+  // What the last frame knows is cheap, and most often enough.
+  std::vector<int> cheap;
   if (known.last)
-    for (const auto& [k, of_blocks] : *known.last)
-      if (k >= low - 1 && k <= high + 1 && !known.now.contains(k)) volume(k, known);
-  const Real exact = high > low && at_low < 0 && at_high >= 0 ? low - at_low / (at_high - at_low) * (high - low) : lower ? low : high;
-  return {lower ? low : high, exact, ((lower ? at_low : at_high) + 1) * target};
+    for (const auto& [k, of_blocks] : *known.last) cheap.push_back(k);
+  if (!cheap.empty()) look(cheap);
+
+  // The volume rises with the shift (it may jump: pieces, thin sheets), so there is one pair of neighbours among the multiples of a number
+  // between which it passes the target, wherever the search begins. Out by steps that double until the target lies between, then regula
+  // falsi with the weight of an end that stays halved (Illinois).
+  struct Between {
+    int low, high;
+    Real at_low, at_high;
+    bool holds() const { return at_low < 0 && at_high >= 0; }
+  };
+  const auto narrowed = [&](Between b, int step) {
+    Real weight_low = b.at_low, weight_high = b.at_high;
+    int stayed = 0;
+    while (b.high - b.low > step && b.holds()) {
+      const int low = b.low / step, high = b.high / step;
+      const int middle = step * std::clamp(static_cast<int>(std::floor(low - weight_low * (high - low) / (weight_high - weight_low))), low + 1, high - 1);
+      const Real at_middle = excess(middle);
+      if (at_middle < 0) {
+        b.low = middle;
+        weight_low = b.at_low = at_middle;
+        if (stayed > 0) weight_high /= 2;
+        stayed = 1;
+      } else {
+        b.high = middle;
+        weight_high = b.at_high = at_middle;
+        if (stayed < 0) weight_low /= 2;
+        stayed = -1;
+      }
+    }
+    return b;
+  };
+  const int stride = std::max(1, static_cast<int>(most * kShiftSteps) / kStrides), end = kStrides * stride;
+  const int first = std::clamp(static_cast<int>(std::floor(static_cast<Real>(known.guess) / stride)) * stride, -end, end);
+  Between b{first, first, excess(first), excess(first)};
+  const bool outward = b.at_low < 0;
+  for (int step = stride; outward ? b.at_high < 0 && b.high < end : b.at_low >= 0 && b.low > -end; step *= 2) {
+    if (outward) {
+      b.low = b.high;
+      b.at_low = b.at_high;
+      b.high = std::min(end, b.high + step);
+      b.at_high = excess(b.high);
+    } else {
+      b.high = b.low;
+      b.at_high = b.at_low;
+      b.low = std::max(-end, b.low - step);
+      b.at_low = excess(b.low);
+    }
+  }
+  b = narrowed(b, stride);
+  Shift shift;
+  if (!b.holds()) {
+    shift.steps = b.at_low >= 0 ? b.low : b.high;
+    shift.exact = shift.steps;
+  } else {
+    const auto slope = [&] { return (b.at_high - b.at_low) / (b.high - b.low); };
+    const Real off = std::min(kVolumeError / slope(), kMostOff);
+    shift.exact = b.low - b.at_low / slope();
+    bool found_round = false;
+    for (int tries = 0; tries < 3 && off > 0.5 && !found_round; ++tries) {
+      shift.steps = roundest(static_cast<int>(std::ceil(shift.exact - off)), static_cast<int>(std::floor(shift.exact + off)));
+      shift.exact = shift.steps - excess(shift.steps) / slope();
+      found_round = std::abs(shift.exact - shift.steps) <= off;
+    }
+    if (!found_round) {
+      // Of the two steps beside the target the nearer one.
+      b = narrowed(b, 1);
+      shift.steps = -b.at_low <= b.at_high ? b.low : b.high;
+      shift.exact = b.low - b.at_low / slope();
+    }
+  }
+  shift.volume = (excess(shift.steps) + 1) * target;
+  std::erase_if(known.now, [&](const auto& of) { return !asked.contains(of.first); });
+  known.range = std::move(volume).ranges();
+  return shift;
 }
 
 Real volume_above_ground(const LevelSet& surface, const geometry::Terrain* terrain) {
