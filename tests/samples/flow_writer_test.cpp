@@ -53,7 +53,7 @@ class FlowOutput : public testing::Test {
   using Words = std::vector<std::string>;
   /// The exit code of the program on the gully scene, coarse, without skin and pictures; what it says goes nowhere.
   static int effuse(const std::string& verb, const Words& words) {
-    std::string line = fmt::format("'{}' {} '{}' --set 'lava.spacing=1.2 m' --set preview.pictures=false --set 'output.formats=[]' --set output.checkpoint_every=3", EFFUSE_PROGRAM, verb,
+    std::string line = fmt::format("'{}' {} '{}' --set 'lava.spacing=1.2 m' --set film.time_scale=4 --set preview.pictures=false --set 'output.formats=[]' --set output.checkpoint_every=3", EFFUSE_PROGRAM, verb,
                                    (kScenes / "lava.toml").string());
     for (const std::string& word : words) line += " '" + word + "'";
     const int status = std::system((line + " >/dev/null 2>&1").c_str());

@@ -618,7 +618,7 @@ TEST_F(ProgramTest, DescribesItsOwnFiles) {
   // The run, by its folder, a folder in it, or its reports: the same words.
   const auto facts = [&](const fs::path& file) { return nlohmann::json::parse(effuse({"info", file, "--json"}).out).at(0).at("facts"); };
   const nlohmann::json run = facts(out);
-  EXPECT_EQ(run.at(0), "run of 'Lava in a gully': 4 frames at 24 a second, 0.17 s of film, 0.666667 s of lava");
+  EXPECT_EQ(run.at(0), "run of 'Lava in a gully': 4 frames at 24 a second, 0.17 s of film, 1.66667 s of lava");
   EXPECT_NE(run.dump().find("done, "), std::string::npos) << run;
   EXPECT_NE(run.dump().find("lava: "), std::string::npos) << run;
   EXPECT_NE(run.dump().find("time went to "), std::string::npos) << run;
