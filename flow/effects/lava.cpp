@@ -46,7 +46,7 @@ Real way_between(const std::vector<Vec3>& sites, const geometry::CollisionMesh& 
 
 /// Lava that comes out in or right beside an obstacle has nowhere to go; a body in its way is thrown off, or wedged in.
 void refuse_blocked_vents(const std::vector<PlannedVent>& plans, const std::vector<sph::Vent>& vents, const World& world, Real spacing, std::vector<Fault>& faults) {
-  if (spacing <= 0) return;
+  if (spacing <= 0 || !(most_sites(plans, spacing) <= kMostSites)) return;  // told already
   std::size_t placed = 0;
   for (const PlannedVent& plan : plans) {
     if (!plan.located || placed == vents.size()) continue;

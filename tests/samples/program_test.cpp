@@ -303,6 +303,8 @@ TEST_F(ProgramTestSlow, RefusesAtOnceWhatWouldNeverEndOrFitInMemory) {
     EXPECT_EQ(outcome.code, 2) << slip << ": " << outcome.out << outcome.err;
     EXPECT_EQ(count(outcome.err, "error: "), 1u) << slip << ": " << outcome.err;
   }
+  // With bodies that a vent must keep off.
+  for (const char* slip : {"lava.spacing=0.01 mm", "lava.vent[0].width=1e9"}) EXPECT_EQ(effuse({"check", kScenes / "boulder.toml", "--set", slip}).code, 2) << slip;
   // A fissure a million kilometres long and a hair wide.
   EXPECT_EQ(effuse({"check", kScenes / "lava.toml", "--set", "lava.vent[0]={from=[18,46],to=[1e9,46],width=1e-9,rate=1}"}).code, 2);
 }
