@@ -24,8 +24,8 @@ sh samples/packages.sh build
 fresh=""
 [ -f build/release/CMakeCache.txt ] || fresh="-DEFFUSE_TESTS=OFF -DEFFUSE_BENCHMARKS=OFF"
 jobs=$(sh samples/jobs.sh)
-# Six minutes of compilers in all, on Xeon cores; ccache makes it seconds once it was built.
-echo "$(date +%H:%M) building effuse, $jobs compilers at once: about $((6 / jobs + 1)) minutes the first time where the cores are free; what it says goes to build/quickstart.log"
+# Twenty minutes of compilers in all, on Xeon cores; ccache makes it seconds once it was built.
+echo "$(date +%H:%M) building effuse, $jobs compilers at once: about $((20 / jobs + 1)) minutes the first time where the cores are free; what it says goes to build/quickstart.log"
 doing="building"
 began=$(date +%s)
 mkdir -p build

@@ -67,7 +67,7 @@ SolidWorld::SolidWorld(const std::vector<PlacedObstacle>& obstacles, const std::
     : friction_(1, 1.0), effusivity_(1, 0.0) {
   for (const PlacedObstacle& each : obstacles) {
     names_.push_back(fmt::format("obstacle '{}'", each.name));
-    if (each.track.keys().size() > 1) moving_.push_back(static_cast<Index>(tracks_.size()));
+    if (each.track.keys().size() > 1) moving_.push_back({static_cast<Index>(tracks_.size())});
     tracks_.push_back(each.track);
     friction_.push_back(each.friction);
     obstacles_.add({each.shape, RigidMotion(each.track.at(0)), each.temperature, static_cast<Index>(tracks_.size())});
@@ -141,9 +141,18 @@ void SolidWorld::go(std::size_t i, const RigidMotion& motion) {
   if (motion.moves() || now.moves() || motion.to().position != now.to().position || motion.to().orientation.coeffs() != now.to().orientation.coeffs()) obstacles_.move(i, motion);
 }
 
+const RigidMotion& SolidWorld::between(Moving& m, Real from, Real to) const {
+  const bool known = m.to > m.from;
+  if (known && from == m.from && to == m.to) return m.way;
+  const geometry::PoseTrack& track = tracks_[m.obstacle];
+  const RigidPose begin = known && from == m.to ? m.end : track.at(from), end = track.at(to);
+  m = {m.obstacle, from, to, end, RigidMotion(begin, end, to - from)};
+  return m.way;
+}
+
 void SolidWorld::stand(Real time, Real dt) {
   time_ = time;
-  for (const Index i : moving_) go(i, tracks_[i].between(time, time + dt).turned_back());
+  for (Moving& m : moving_) go(m.obstacle, between(m, time, time + dt).turned_back());
   for (std::size_t b = 0; b < ids_.size(); ++b) {
     if (gone(b)) continue;
     const RigidPose now = bodies_->body_pose(ids_[b]);
@@ -156,7 +165,7 @@ void SolidWorld::stand(Real time, Real dt) {
 }
 
 void SolidWorld::move(Real from, Real to) {
-  for (const Index i : moving_) go(i, tracks_[i].between(from, to));
+  for (Moving& m : moving_) go(m.obstacle, between(m, from, to));
   for (std::size_t b = 0; b < ids_.size(); ++b)
     if (!gone(b)) go(place(b), RigidMotion(before_[b], bodies_->body_pose(ids_[b]), last_dt_));
   obstacles_.update();
@@ -209,7 +218,7 @@ void SolidWorld::take(std::span<const Movable> movable, Real dt) {
 
 /// Bodies and driven obstacles from time_ on.
 void SolidWorld::step_bodies(Real dt) {
-  for (const Index i : moving_) bodies_->move_to(driven_[i], tracks_[i].at(time_ + dt));
+  for (const Moving& m : moving_) bodies_->move_to(driven_[m.obstacle], tracks_[m.obstacle].at(time_ + dt));
   if (brittle_) {
     const bodies::BrittleReport report = brittle_->step(dt);
     last_ = report.bodies;

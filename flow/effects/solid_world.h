@@ -102,7 +102,15 @@ class SolidWorld {
   void load(StateReader& in);
 
  private:
+  /// An obstacle whose track has several keys, and what the track said last: it is asked twice a step, and begins where it ended.
+  struct Moving {
+    Index obstacle;
+    Real from = 0, to = 0;
+    geometry::RigidPose end = {};
+    geometry::RigidMotion way = {};
+  };
   void go(std::size_t obstacle, const geometry::RigidMotion& motion);
+  const geometry::RigidMotion& between(Moving& moving, Real from, Real to) const;
   void tell(std::vector<sph::Movable>& movable) const;
   void take(std::span<const sph::Movable> movable, Real dt);
   void step_bodies(Real dt);
@@ -130,7 +138,7 @@ class SolidWorld {
 
   std::vector<std::string> names_;       // by surface: obstacles', bodies', solids' that deform, pieces'
   std::vector<geometry::PoseTrack> tracks_;
-  std::vector<Index> moving_;            // obstacles whose tracks have several keys
+  std::vector<Moving> moving_;
   std::vector<bodies::BodyId> driven_;   // of each obstacle; only where there are bodies
   std::vector<bodies::BodyId> ids_;      // of bodies, then pieces
   std::size_t of_scene_ = 0;             // bodies of the scene among them

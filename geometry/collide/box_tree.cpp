@@ -151,8 +151,30 @@ BoxTree triangle_tree(std::span<const Vec3> positions, std::span<const Triangle>
 struct MovingBoxes::Impl {
   Dynamic tree;
   std::vector<Dynamic::NodeType*> leaf;  // of each item; nullptr: not there
-  bool moved = false, unbalanced = false;
+  bool changed = false, unbalanced = false;
 };
+
+namespace {
+
+constexpr Real kMostRoom = 1.2;  // a held box's surface over the box's own
+
+/// The box, wider on all sides by what makes its surface seven eighths of the way to kMostRoom: it may go that far, and shrink a little.
+Box3 with_room(const Box3& box) {
+  const Vec3 side = box.sizes();
+  const Real sum = side.sum(), add = 0.875 * (kMostRoom - 1) * half_surface(box);
+  // (a + 2 p)(b + 2 p) + ... = ab + bc + ca + add: 12 p^2 + 4 sum p - add = 0.
+  const Vec3 room = Vec3::Constant(add > 0 ? add / (2 * sum + std::sqrt(4 * sum * sum + 12 * add)) : 0);
+  return Box3(box.min() - room, box.max() + room);
+}
+
+fcl::AABBd to_fcl(const Box3& box) {
+  fcl::AABBd bv;
+  bv.min_ = box.min();
+  bv.max_ = box.max();
+  return bv;
+}
+
+}  // namespace
 
 MovingBoxes::MovingBoxes() : impl_(std::make_unique<Impl>()) {}
 MovingBoxes::~MovingBoxes() = default;
@@ -162,28 +184,29 @@ MovingBoxes& MovingBoxes::operator=(MovingBoxes&&) noexcept = default;
 void MovingBoxes::set(Index item, const Box3& box) {
   CHECK(!box.isEmpty() && box.min().allFinite() && box.max().allFinite());
   if (impl_->leaf.size() <= item) impl_->leaf.resize(item + 1, nullptr);
-  fcl::AABBd bv;
-  bv.min_ = box.min();
-  bv.max_ = box.max();
   auto& leaf = impl_->leaf[item];
-  if (!leaf) {
-    // The leaf's data is the item's number, kept where FCL keeps a pointer.
-    leaf = impl_->tree.insert(bv, reinterpret_cast<void*>(static_cast<std::uintptr_t>(item)));
-    impl_->unbalanced = true;
-  } else if (!leaf->bv.contain(bv) || half_surface(from_fcl(leaf->bv)) > 1.2 * half_surface(box)) {
+  const bool is_new = leaf == nullptr;
+  if (!is_new) {
+    if (leaf->bv.contain(to_fcl(box)) && half_surface(from_fcl(leaf->bv)) <= kMostRoom * half_surface(box)) return;
     impl_->tree.remove(leaf);
-    leaf = impl_->tree.insert(bv, reinterpret_cast<void*>(static_cast<std::uintptr_t>(item)));
-    impl_->moved = true;
   }
+  // The leaf's data is the item's number, kept where FCL keeps a pointer.
+  leaf = impl_->tree.insert(to_fcl(is_new ? box : with_room(box)), reinterpret_cast<void*>(static_cast<std::uintptr_t>(item)));
+  impl_->changed = true;
+  if (is_new) impl_->unbalanced = true;
 }
 
 void MovingBoxes::remove(Index item) {
   if (item >= impl_->leaf.size() || !impl_->leaf[item]) return;
   impl_->tree.remove(impl_->leaf[item]);
   impl_->leaf[item] = nullptr;
+  impl_->changed = true;
 }
 
+bool MovingBoxes::changed() const { return impl_->changed; }
+
 BoxTree MovingBoxes::flat() {
+  impl_->changed = false;
   if (impl_->tree.empty()) return {};
   if (impl_->unbalanced) impl_->tree.balanceTopdown();
   impl_->unbalanced = false;

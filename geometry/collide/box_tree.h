@@ -77,7 +77,8 @@ class BoxTree {
 /// The tree over triangles, by fcl::BVHModel<AABB>. Finite positions, triangles of area > 0, at least one.
 BoxTree triangle_tree(std::span<const Vec3> positions, std::span<const Triangle> triangles);
 
-/// Boxes that come, go and move: fcl's dynamic tree of boxes.
+/// Boxes that come, go and move: fcl's dynamic tree of boxes. One that has moved is held with room around it, so that the tree stays as it
+/// is while the box stays within it.
 class MovingBoxes {
  public:
   MovingBoxes();
@@ -87,7 +88,9 @@ class MovingBoxes {
   /// Puts item where it is now. Finite, not empty (checked).
   void set(Index item, const Box3& box);
   void remove(Index item);
-  /// The tree as it stands.
+  /// Whether flat() would be another tree than it was the last time.
+  bool changed() const;
+  /// The tree as it stands: each box, with the room that it is held with.
   BoxTree flat();
 
  private:

@@ -90,7 +90,7 @@ void Obstacles::update() {
     impl_->boxes.set(i, place.swept);
   }
   impl_->changed.clear();
-  impl_->tree = impl_->boxes.flat();
+  if (impl_->boxes.changed()) impl_->tree = impl_->boxes.flat();
   impl_->now = impl_->swept = Box3();
   for (const Impl::Place& place : impl_->place) {
     if (!place.there) continue;

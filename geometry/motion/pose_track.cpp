@@ -16,6 +16,7 @@ Vec3 rotation_vector(const Quat& q) {
 }
 
 Quat rotation_by(const Vec3& axis_angle) {
+  if (axis_angle == Vec3::Zero()) return Quat::Identity();
   const Real half = axis_angle.norm() / 2;
   // sin(half) / (2 half): its series where the quotient would lose digits.
   const Real s = half > 1e-4 ? std::sin(half) / (2 * half) : (1 - half * half / 6) / 2;

@@ -53,7 +53,7 @@ struct Making {
 };
 
 /// The field as it comes from the particles. felt: blocks whose values are asked for (rasterize_anisotropic); empty: all.
-void rasterize(const LevelSet::Impl& s, const Blocks& blocks, Raster& raster, std::span<const std::uint8_t> felt = {}) {
+void rasterize(const LevelSet::Impl& s, const Blocks& blocks, RasterField& raster, std::span<const std::uint8_t> felt = {}) {
   if (s.rule.kernel == SurfaceKernel::kRound) return rasterize(s.particles, blocks, s.rule.raster, {}, raster);
   Blocks asked = blocks;
   if (!felt.empty()) {
@@ -131,7 +131,7 @@ Renewal renew_field(const LevelSet::Impl& s, const Making& making, SurfaceCache:
     return renewal;
   }
   const Blocks part(coords);
-  Raster raster;
+  RasterField raster;
   if (round) {
     rearrange(last.raster.phi, renewal.before);
     rearrange(last.raster.weight, renewal.before);
@@ -213,7 +213,7 @@ bool volume_is_known(const LevelSet::Impl& s, const Making& making, const Shift&
 Real build(LevelSet::Impl& s, const Making& making) {
   GroundField ground;
   KnownVolumes known;
-  Raster raster;
+  RasterField raster;
   rasterize(s, s.blocks, raster);
   s.phi = make_field(s, s.blocks, making, std::move(raster.phi), raster.weight, ground);
   raster = {};

@@ -302,7 +302,7 @@ void candidates(const ParticleGrid& particles, const BlockCoord& coord, Real rea
   });
 }
 
-void rasterize_fine(const ParticleGrid& particles, const Blocks& blocks, const RasterOptions& o, std::span<const RowSet> rows, Raster& raster) {
+void rasterize_fine(const ParticleGrid& particles, const Blocks& blocks, const RasterOptions& o, std::span<const RowSet> rows, RasterField& raster) {
   const std::size_t n = blocks.size();
   raster.nodes.resize(n);
   raster.covered.resize(n);
@@ -359,7 +359,7 @@ void rasterize_fine(const ParticleGrid& particles, const Blocks& blocks, const R
 
 }  // namespace
 
-void rasterize(const ParticleGrid& particles, const Blocks& blocks, const RasterOptions& options, std::span<const RowSet> rows, Raster& raster) {
+void rasterize(const ParticleGrid& particles, const Blocks& blocks, const RasterOptions& options, std::span<const RowSet> rows, RasterField& raster) {
   ZONE("skin.rasterize");
   CHECK(rows.empty() || rows.size() == blocks.size());
   raster.phi.resize(blocks.size() * kVoxels);
@@ -386,7 +386,7 @@ void rasterize(const ParticleGrid& particles, const Blocks& blocks, const Raster
 }
 
 void rasterize(const ParticleGrid& particles, const Blocks& blocks, const RasterOptions& options, Field& phi, Field& weight) {
-  Raster raster;
+  RasterField raster;
   raster.phi.swap(phi);
   raster.weight.swap(weight);
   rasterize(particles, blocks, options, {}, raster);

@@ -48,7 +48,7 @@ struct NodeSums {
 };
 
 /// The field, and what it takes to make parts of it anew.
-struct Raster {
+struct RasterField {
   Field phi, weight;
   std::vector<NodeSums> nodes;        ///< of each block, from kFineReach on
   std::vector<std::uint8_t> covered;  ///< of each block, from kFineReach on: particles lie near all its nodes
@@ -57,11 +57,11 @@ struct Raster {
 /// Rows of voxels of a block: bit 8 i + j is row (i, j, .).
 using RowSet = std::uint64_t;
 
-/// rasterize(), into a Raster; with rows, that of the same blocks and other particles, of which every row that a particle of one of the two
+/// rasterize(), into a RasterField; with rows, that of the same blocks and other particles, of which every row that a particle of one of the two
 /// alone is felt in is among `rows`, all of a block that was none before: the same bits as of all rows.
 ///   rows    of each block; empty: all of all
 ///   raster  in, out
-void rasterize(const ParticleGrid& particles, const Blocks& blocks, const RasterOptions& options, std::span<const RowSet> rows, Raster& raster);
+void rasterize(const ParticleGrid& particles, const Blocks& blocks, const RasterOptions& options, std::span<const RowSet> rows, RasterField& raster);
 
 /// The same at one point, in double, over all particles: the twin that tests compare with.
 Real zhu_bridson(const ParticleGrid& particles, const RasterOptions& options, const Vec3& p);

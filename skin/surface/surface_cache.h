@@ -37,7 +37,7 @@ struct SurfaceCache::Impl {
 
   Blocks blocks;
   ParticleGrid particles;
-  Raster raster;                    // the field as it comes from the particles; empty for kAnisotropic
+  RasterField raster;                    // the field as it comes from the particles; empty for kAnisotropic
   Field lifted, distance, above;    // before the shift; the ground's two only with a terrain
   std::map<int, std::vector<Real>> volumes;  // by shift, in steps: of each block
   std::vector<KnownVolumes::Range> range;

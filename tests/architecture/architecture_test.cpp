@@ -71,6 +71,18 @@ TEST(Tree, NoIncludeClimbsAndEveryPackageStaysAtHome) {
 
 TEST(Tree, NoIncludesGoInACircle) { EXPECT_TRUE(circles(tree()).empty()) << lines(circles(tree())); }
 
+TEST(Tree, NoTypeIsDefinedTwice) {
+  std::map<std::string, std::string> code;
+  std::size_t types = 0;
+  for (const auto& [path, text] : tree())
+    if (is_code(path)) {
+      code[path] = text;
+      types += types_of(text).size();
+    }
+  EXPECT_TRUE(types_defined_twice(code).empty()) << lines(types_defined_twice(code));
+  EXPECT_GT(types, 400u) << "the reader of types has gone blind";
+}
+
 TEST(Tree, CodeHasTheTwoEndingsTheRulesRead) {
   for (const auto& entry : fs::recursive_directory_iterator(kRoot / "tests")) EXPECT_NE(entry.path().extension(), ".cc") << entry.path();
   for (const std::string room : {"geometry", "flow", "skin", "importers", "samples"})
@@ -215,6 +227,20 @@ TEST(CircleRule, FindsACircleOfThreeAndLeavesADiamondAlone) {
   const Faults found = circles({{"a.h", "#include \"b.h\""}, {"b.h", "#include \"c.h\""}, {"c.h", "#include \"a.h\""}});
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0], "a.h -> b.h -> c.h -> a.h");
+}
+
+TEST(TypeRule, FindsTheSameNameInOneNamespaceOnly) {
+  const std::string front = "namespace effuse::skin {\n";
+  const std::string back = "}  // namespace effuse::skin\n";
+  const std::string map = front + "struct Raster {\n};\n" + back;
+  const std::string field = front + "struct Other;\nclass Raster final : public Base {\n  struct Part {\n" + back;
+  EXPECT_EQ(types_defined_twice({{"skin/a.h", map}, {"skin/b.h", field}}),
+            (Faults{"skin/b.h:3: effuse::skin::Raster is defined in skin/a.h:2 as well"}));
+  EXPECT_EQ(types_defined_twice({{"skin/a.h", front + "template <class T> struct Raster {\n"}, {"skin/b.h", front + "enum class Raster : int {\n"}}).size(), 1u);
+  const std::string hidden = front + "namespace {\nstruct Raster {\n}  // namespace\n" + back;
+  const std::string elsewhere = "namespace effuse::flow {\nstruct Raster {\n}  // namespace effuse::flow\n";
+  EXPECT_TRUE(types_defined_twice({{"skin/a.h", map}, {"skin/b.cpp", hidden}, {"flow/c.h", elsewhere}, {"skin/d.h", front + "struct Raster;\n" + back}}).empty());
+  EXPECT_EQ(types_of(hidden + field).size(), 1u) << "a namespace that ended is left";
 }
 
 TEST(TopLevelRule, FindsWhatIsMissingAndWhatIsTooMuch) {

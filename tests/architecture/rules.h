@@ -213,6 +213,50 @@ inline Faults circles(const std::map<std::string, std::string>& files) {
   return found;
 }
 
+/// A struct, class, union or enum that is defined at a namespace's own level, where it has a name in the whole program.
+struct Type {
+  int line = 0;
+  std::string name;  ///< "effuse::skin::Raster"
+};
+
+/// The types of a C++ text as our formatting writes it: namespaces and what is directly in them begin a line. None of
+/// anonymous namespaces, and none outside any.
+inline std::vector<Type> types_of(const std::string& text) {
+  static const std::regex opens(R"(^(?:inline )?namespace ?([\w:]*) ?\{)");
+  static const std::regex type(R"(^(?:template ?<.*> )?(?:struct|class|union|enum|enum class)(?: alignas\(\w+\))? (\w+)(?: final)?(?: :[^;{]*)? ?\{)");
+  std::vector<Type> found;
+  std::vector<std::string> within;
+  std::istringstream in(text);
+  std::string line;
+  for (int number = 1; std::getline(in, line); ++number) {
+    std::smatch match;
+    if (starts_with(line, "}  // namespace")) {
+      if (!within.empty()) within.pop_back();
+    } else if (std::regex_search(line, match, opens)) {
+      within.push_back(match[1]);
+    } else if (!within.empty() && std::find(within.begin(), within.end(), "") == within.end() && std::regex_search(line, match, type)) {
+      std::string name;
+      for (const std::string& space : within) name += space + "::";
+      found.push_back({number, name + std::string(match[1])});
+    }
+  }
+  return found;
+}
+
+/// Types of one name that two files define. Each may be fine by itself; in one program the linker keeps one
+/// destructor for both, and says nothing ([basic.def.odr]).
+inline Faults types_defined_twice(const std::map<std::string, std::string>& files) {
+  std::map<std::string, std::string> first;
+  Faults faults;
+  for (const auto& [path, text] : files)
+    for (const Type& type : types_of(text)) {
+      const std::string here = path + ":" + std::to_string(type.line);
+      const auto [at, is_new] = first.emplace(type.name, here);
+      if (!is_new) faults.push_back(here + ": " + type.name + " is defined in " + at->second + " as well");
+    }
+  return faults;
+}
+
 /// What is wrong with the names at the top level: exactly the design's, besides dot-names and what builds leave behind.
 inline Faults top_level_faults(const std::vector<std::string>& names) {
   static const std::set<std::string> wanted{"CMakeLists.txt", "CMakePresets.json", "LICENSE", "README.md", "geometry", "flow", "skin", "importers", "tests", "samples"};

@@ -664,6 +664,7 @@ TEST_F(ProgramTest, TwoRunsDoNotWriteIntoOneFolder) {
     ASSERT_EQ(::waitpid(pid, nullptr, WNOHANG), 0) << "it ended by itself";
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
+  ::kill(pid, SIGSTOP);  // however long the others take, it is still writing
   for (const char* how : {"--resume", "--force"}) {
     const Outcome second = effuse(run_gully(out, 200, {how}));
     EXPECT_EQ(second.code, 2);
@@ -671,6 +672,7 @@ TEST_F(ProgramTest, TwoRunsDoNotWriteIntoOneFolder) {
   }
   EXPECT_TRUE(fs::exists(out / "frames" / "lava.0001.vdb"));
   ::kill(pid, SIGHUP);  // the terminal closes: as Ctrl-C
+  ::kill(pid, SIGCONT);
   EXPECT_EQ(wait(pid).code, 130);
 }
 

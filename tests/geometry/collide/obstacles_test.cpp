@@ -98,6 +98,23 @@ TEST(Obstacles, MovedAndRemovedOnesAreWhereTheyAre) {
   EXPECT_EQ(crowd.all.contacts({0, 0, 0}, 100, std::span(&contact, 1)), 0);
 }
 
+// A tenth of a box a step: some stay within the room that the tree holds them with, some leave it, in every step.
+TEST(Obstacles, ThoseThatCreepAreWhereTheyAreInEveryStep) {
+  Crowd crowd = ::effuse::geometry::crowd(30);
+  const std::vector<char> there(30, 1);
+  for (std::uint64_t round = 0; round < 60; ++round) {
+    for (std::size_t k = 0; k < crowd.each.size(); ++k) {
+      const RigidPose from = crowd.each[k].motion.to();
+      RigidPose to = from;
+      to.position += 0.1 * random_uniform(140, 0, k) * truth::unit(141, k);
+      crowd.each[k].motion = RigidMotion(from, to, 0.1);
+      crowd.all.move(k, crowd.each[k].motion);
+    }
+    crowd.all.update();
+    for (std::uint64_t k = 0; k < 30; ++k) expect_as_one_by_one(crowd, there, 10 * random_uniform(142, round, k) * truth::unit(143 + round, k), 0.7, 2);
+  }
+}
+
 TEST(Obstacles, ThousandsOfContactsHaveTheSameBitsOnAnyNumberOfThreads) {
   const Crowd crowd = ::effuse::geometry::crowd(200);
   std::vector<Vec3> points;

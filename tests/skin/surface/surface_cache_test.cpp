@@ -136,7 +136,7 @@ TEST(SurfaceCacheParts, RowsThatAParticleOfOneFrameAloneIsFeltInAreMadeAnewAndTh
     const Cloud first = fill(Box3(Vec3(-9, -9, -3), Vec3(9, 9, 3)), 1, [](const Vec3&) { return true; }, 0.2);
     const RasterOptions o{.reach = 2 * d, .spacing = d, .outside = 1.4f * d};
     SurfaceCache::Impl last;
-    Raster& raster = last.raster;
+    RasterField& raster = last.raster;
     for (int frame = 0; frame < 3; ++frame) {
       const ParticleGrid grid(moved(first, frame).bare(), 1 / static_cast<Real>(d), static_cast<Real>(d));
       const Blocks blocks = blocks_around(grid, static_cast<Real>(o.reach));
