@@ -112,7 +112,7 @@ TEST(SolidWorld, AClosedBoxAndWhatIsInItKeepTheirMomentumTogether) {
 }
 
 // Lava slumps over pebbles that are far lighter than its particles, of 40 kg: it takes them along, it does not shoot them.
-TEST(SolidWorld, PebblesLighterThanAParticleGoNoFasterThanTheLava) {
+TEST(SolidWorldSlow, PebblesLighterThanAParticleGoNoFasterThanTheLava) {
   const Real dx = 0.25;
   for (const Real edge : {0.1, 0.02, 0.002}) {
     std::vector<PlacedBody> pebbles;
