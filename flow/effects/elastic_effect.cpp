@@ -9,6 +9,7 @@
 #include "flow/effects/effect_table.h"
 #include "flow/effects/elastic_shape.h"
 #include "flow/effects/met_things.h"
+#include "flow/effects/pins.h"
 #include "flow/scene/placing.h"
 #include "geometry/base/error.h"
 #include "geometry/base/parallel.h"
@@ -23,11 +24,6 @@ using fem::ElasticSolid;
 
 constexpr Real kStep = 1. / 240;  // [s]: longer ones are stable, and dull
 constexpr int kHalvings = 8;      // of a step that went bad
-
-struct Pin {
-  Vec3 at;
-  Real radius;
-};
 
 /// The table, read.
 struct ElasticSettings {
@@ -57,8 +53,7 @@ class ElasticEffect final : public Effect, private Deformable {
     const Vec3 middle = settings.pose.position;
     for (std::size_t i = 0; i < solid_.nodes(); ++i) {
       solid_.state().v[i] = settings.velocity + settings.spin.cross(solid_.state().x[i] - middle);
-      for (const Pin& pin : settings.pins)
-        if ((solid_.state().x[i] - pin.at).norm() <= pin.radius) solid_.held()[i] = 1;
+      if (is_pinned(settings.pins, solid_.state().x[i])) solid_.held()[i] = 1;
       if (solid_.held()[i]) solid_.state().v[i] = Vec3::Zero();
     }
     start_ = solid_.state().x;
@@ -80,7 +75,7 @@ class ElasticEffect final : public Effect, private Deformable {
   SoftSolid soft() override {
     if (!settings_.meets_lava) return {};
     find_surface();
-    return {this, settings_.lava_friction, settings_.temperature, solid_.rest_volume(), settings_.heat};
+    return {this, settings_.lava_friction, settings_.temperature, solid_.rest_volume(), settings_.heat, settings_.form.place};
   }
   void led_by(Effect& leader) override { leader_ = &leader; }
 
@@ -271,10 +266,10 @@ ElasticSettings read(Parameters& p) {
   s.on_ground = p.flag("on_ground", false, "its height counts from the terrain at x, y");
   s.velocity = read_vector(p, "velocity", "m/s", s.velocity, "at the start");
   s.spin = read_vector(p, "spin", "rad/s", s.spin, "at the start, about its position");
-  for (const std::vector<Real>& pin : p.number_lists("pins", "m", 4, false, "[x, y, z, radius]: points that start this near are held")) s.pins.push_back({Vec3(pin[0], pin[1], pin[2]), pin[3]});
+  s.pins = read_pins(p);
   s.pinned_to = p.text("pinned_to", "", "obstacle that carries the held points");
   s.gravity = read_vector(p, "gravity", "m/s2", s.gravity, "");
-  s.meets = p.flag("meets_ground", true, "and obstacles");
+  s.meets = p.flag("meets_ground", true, "and obstacles; other solids that deform it does not meet");
   s.meets_lava = p.flag("meets_lava", true, "(modern lava): each pushes the other; false: neither knows of the other");
   s.lava_friction = p.number("lava_friction", "", s.lava_friction, {0, 1}, "of lava on it: 1 no slip, 0 free slip");
   s.temperature = p.number("temperature", "K", s.temperature, {0, 5000}, "of its surface; 0: the ground's");
@@ -292,25 +287,31 @@ ElasticSettings read(Parameters& p) {
 std::optional<ElasticShape> make_shape(const ElasticSettings& s, const World& world, std::vector<Fault>& faults) {
   const Place place = s.form.place;
   const std::string what = fmt::format("elastic '{}'", s.form.name);
+  if (!has_shape(s.form)) return std::nullopt;  // told already
   try {
-    geometry::RigidPose pose = s.pose;
-    if (s.on_ground && (!world.terrain || !put_on_terrain(pose, true, *world.terrain, what, place, faults))) return std::nullopt;
-    if (!s.pinned_to.empty()) {
-      std::vector<std::string> names;
-      if (world.obstacles)
-        for (const PlacedObstacle& each : *world.obstacles) names.push_back(each.name);
-      if (std::find(names.begin(), names.end(), s.pinned_to) == names.end()) {
-        const std::string near = nearest_name(s.pinned_to, names);
-        throw InputError(place, fmt::format("{}: pinned_to names '{}', no obstacle of the scene{}", what, s.pinned_to, near.empty() ? "" : fmt::format(" (did you mean {}?)", near)));
-      }
+    ElasticShape shape;
+    if (s.form.box.minCoeff() > 0) {
+      shape = box_shape(s.form.box, s.spacing, s.material, s.pose, what);
+    } else {
+      const geometry::TriMesh mesh = s.form.file.empty() ? mesh_of(s.form) : upright(world.mesh(s.form), s.form.scale, s.form.y_up);
+      shape = mesh_shape(mesh, s.spacing, s.material, s.pose, what);
     }
-    if (s.form.box.minCoeff() > 0) return box_shape(s.form.box, s.spacing, s.material, pose, what);
-    const geometry::TriMesh mesh = s.form.file.empty() ? mesh_of(s.form) : upright(world.mesh(s.form), s.form.scale, s.form.y_up);
-    return mesh_shape(mesh, s.spacing, s.material, pose, what);
+    const std::size_t before = faults.size();
+    check_start(shape.tets.nodes, s.pins, s.meets ? world.terrain : nullptr, what, place, faults);
+    check_driver(s.pinned_to, world, what, place, faults);
+    if (faults.size() > before) return std::nullopt;
+    return shape;
   } catch (const InputError& error) {
     for (const Fault& fault : error.faults()) faults.push_back(fault.place.line > 0 ? fault : Fault{place, fault.message});
     return std::nullopt;
   }
+}
+
+/// The table in the scene's own coordinates; none: it has no place there.
+std::optional<ElasticSettings> in_scene(ElasticSettings s, const World& world, std::vector<Fault>& faults) {
+  if (!put_in_scene(s.pose, s.on_ground, world, fmt::format("elastic '{}'", s.form.name), s.form.place, faults)) return std::nullopt;
+  s.pins = in_scene(std::move(s.pins), world.terrain);
+  return s;
 }
 
 }  // namespace
@@ -329,14 +330,16 @@ EffectPlan read_elastic(Parameters& parameters, Real duration) {
   plan.estimate.seconds = plan.estimate.steps * tets * 1e-5;
   plan.misfits = [settings](const World& world) {
     std::vector<Fault> faults;
-    make_shape(settings, world, faults);
+    if (const auto local = in_scene(settings, world, faults)) make_shape(*local, world, faults);
     return faults;
   };
   plan.build = [settings](const World& world) -> std::unique_ptr<Effect> {
     std::vector<Fault> faults;
-    std::optional<ElasticShape> shape = make_shape(settings, world, faults);
+    const auto local = in_scene(settings, world, faults);
+    std::optional<ElasticShape> shape;
+    if (local) shape = make_shape(*local, world, faults);
     if (!shape) throw InputError(faults);
-    return std::make_unique<ElasticEffect>(settings, world, std::move(*shape));
+    return std::make_unique<ElasticEffect>(*local, world, std::move(*shape));
   };
   return plan;
 }

@@ -33,7 +33,7 @@ MetThings::MetThings(const World& world) {
   }
 }
 
-/// Surfaces are numbered as SolidWorld has them, so that of two at equal distance the same one is met after loading.
+/// Surfaces are numbered by what they are, not by when they came: of two at equal distance the same one is met after loading.
 std::size_t MetThings::add(const geometry::TriMesh& mesh, const RigidPose& pose, Index id, Real temperature) {
   return obstacles_.add({geometry::CollisionMesh(mesh), RigidMotion{pose, pose, 1}, temperature, static_cast<Index>(tracks_.size() + 1 + id)});
 }

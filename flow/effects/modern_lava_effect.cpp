@@ -63,6 +63,7 @@ class ModernLavaEffect final : public Effect {
     for (Effect* other : others)
       if (const SoftSolid soft = other->soft(); soft.solid) {
         solids_->add_soft(std::string(other->name()), soft);
+        refuse_over_vents(soft, other->name());
         other->led_by(*this);
       }
     if (solids_->softs() > 0) {
@@ -81,6 +82,16 @@ class ModernLavaEffect final : public Effect {
                      },
                      law});
   }
+  /// A spacing is what lava needs to come out; where solids will be when later vents open nobody knows.
+  void refuse_over_vents(const SoftSolid& soft, std::string_view name) const {
+    for (const Mouth& mouth : openings_)
+      for (const Vec3& site : mouth.sites) {
+        if (mouth.start > 0) break;
+        if (const Real way = solids_->distance_to_last(site, spacing()); way < spacing())
+          throw InputError(soft.place, fmt::format("'{}' is {} the vent when it opens, wanted at least a spacing, {:.3g} m, between them", name, way <= 0 ? std::string("over") : fmt::format("{:.2g} m from", way), spacing()));
+      }
+  }
+
   FlowView flow() const override {
     return {lava_.positions(), lava_.velocities(), heat_ ? lava_.heat().surface_temperature() : lava_.temperatures(), lava_.surface(), spacing()};
   }

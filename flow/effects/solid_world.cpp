@@ -279,13 +279,26 @@ void SolidWorld::add_soft(const std::string& name, const SoftSolid& soft) {
   surface.gather(soft.solid->places(), mesh.positions);
   mesh.triangles = surface.triangles;
   // Behind those that are there: its surface's number is its place's, and one.
-  const std::size_t number = obstacles_.add({geometry::CollisionMesh(mesh), {}, soft.temperature, static_cast<Index>(obstacles_.size() + 1)});
+  const auto shape = [&] {
+    try {
+      return geometry::CollisionMesh(mesh);
+    } catch (const InputError& error) {
+      throw InputError(soft.place, fmt::format("'{}' as lava would meet it: {}", name, error.faults().front().message));
+    }
+  };
+  const std::size_t number = obstacles_.add({shape(), {}, soft.temperature, static_cast<Index>(obstacles_.size() + 1)});
   CHECK_EQ(number, tracks_.size() + of_scene_ + soft_.size());
-  soft_.push_back({number, soft.solid});
+  soft_.push_back({number, soft.solid, name});
   names_.push_back(fmt::format("'{}'", name));
   friction_.push_back(soft.friction);
   add_heat(name, soft.material, soft.temperature, soft.volume);
   obstacles_.update();
+}
+
+Real SolidWorld::distance_to_last(const Vec3& point, Real reach) const {
+  const geometry::Obstacle& last = obstacles_[soft_.back().obstacle];
+  const Vec3 local = last.motion.to().body(point);
+  return last.shape.inside(local) ? 0 : last.shape.signed_distance(local, reach);
 }
 
 sph::SolidOptions SolidWorld::solids() {

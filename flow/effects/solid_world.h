@@ -70,6 +70,8 @@ class SolidWorld {
     Real distance = 0, speed = 0;  ///< [m], negative inside; of the surface there [m/s]
   };
   std::optional<Near> nearest(const Vec3& point, Real reach) const;
+  /// From the solid that was added last [m]; 0 inside, infinite beyond reach.
+  Real distance_to_last(const Vec3& point, Real reach) const;
   bool any() const { return !obstacles_.empty(); }
   /// Bodies there are now, pieces and blocks among them.
   std::size_t count() const;

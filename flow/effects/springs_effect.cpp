@@ -8,12 +8,14 @@
 
 #include "flow/effects/effect_table.h"
 #include "flow/effects/met_things.h"
+#include "flow/effects/pins.h"
 #include "flow/scene/placing.h"
 #include "flow/springs/builders.h"
 #include "flow/springs/spring_system.h"
 #include "geometry/base/error.h"
 #include "geometry/base/parallel.h"
 #include "geometry/mesh/measure.h"
+#include "geometry/mesh/weld.h"
 
 namespace effuse::flow {
 
@@ -27,11 +29,6 @@ constexpr Real kSafety = 0.5;      // share of the longest stable step that a st
 constexpr int kHalvings = 10;      // of a step that went bad
 constexpr Real kImplicitStep = 1. / 240;  // [s]: longer ones are stable, and dull
 constexpr float kJellyColor[] = {0.55f, 0.08f, 0.05f}, kClothColor[] = {0.08f, 0.16f, 0.45f};  // linear light
-
-struct Pin {
-  Vec3 at;
-  Real radius;
-};
 
 /// The table, read.
 struct SpringsSettings {
@@ -64,8 +61,7 @@ class SpringsEffect final : public Effect, private Deformable {
     for (const auto& each : world.obstacles ? *world.obstacles : std::vector<PlacedObstacle>())
       if (each.name == settings.pinned_to) driver_ = each.track;
     for (std::size_t i = 0; i < state_.x.size(); ++i)
-      for (const Pin& pin : settings.pins)
-        if ((state_.x[i] - pin.at).norm() <= pin.radius) body_.network.held[i] = 1;
+      if (is_pinned(settings.pins, state_.x[i])) body_.network.held[i] = 1;
     start_ = state_.x;
     make_system();
   }
@@ -84,10 +80,12 @@ class SpringsEffect final : public Effect, private Deformable {
 
   SoftSolid soft() override {
     if (!settings_.meets_lava) return {};
+    refuse_double_vertices();
     find_surface();
     SoftSolid soft;
     soft.solid = this;
     soft.friction = settings_.lava_friction;
+    soft.place = settings_.form.place;
     return soft;
   }
   void led_by(Effect& leader) override { leader_ = &leader; }
@@ -152,6 +150,7 @@ class SpringsEffect final : public Effect, private Deformable {
     out.array("x", state_.x);
     out.array("v", state_.v);
     out.array("torn", torn_);
+    out.value("longest_stable_step", std::isfinite(limit_) ? limit_ : 0);
     if (leader_) out.array("owed", owed_.impulses());
     things_.save(out);
   }
@@ -163,6 +162,8 @@ class SpringsEffect final : public Effect, private Deformable {
     in.array("x", state.x);
     in.array("v", state.v);
     in.array("torn", torn_);
+    Real limit = 0;
+    in.value("longest_stable_step", limit);
     if (leader_) in.array("owed", owed_.impulses());
     things_.load(in);
     if (!owed_.impulses().empty() && owed_.impulses().size() != state_.x.size()) throw InputError(Place{"checkpoint"}, fmt::format("springs '{}': impulses on {} points, the scene's have {}", settings_.name, owed_.impulses().size(), state_.x.size()));
@@ -170,6 +171,7 @@ class SpringsEffect final : public Effect, private Deformable {
     state_ = std::move(state);
     std::erase_if(body_.network.springs, [&](const springs::Spring& s) { return std::binary_search(torn_.begin(), torn_.end(), pair_of(s.a, s.b)); });
     make_system();
+    set_step(limit > 0 ? limit : std::numeric_limits<Real>::infinity());  // as it was found where it began, or tore last
     if (leader_) find_surface();
   }
   std::vector<std::pair<std::string, double>> figures() const override {
@@ -182,7 +184,10 @@ class SpringsEffect final : public Effect, private Deformable {
             {"kinetic_energy_j", springs::kinetic_energy(body_.network, state_)},
             {"spring_energy_j", springs::spring_energy(body_.network, state_)}};
   }
-  std::string status() const override { return fmt::format("{} points, {} springs, dt {:.3g} s", state_.x.size(), body_.network.springs.size(), settings_.step > 0 ? settings_.step : own_step_); }
+  std::string status() const override {
+    const Real dt = settings_.step > 0 ? settings_.step : own_step_;
+    return fmt::format("{} points, {} springs, {}", state_.x.size(), body_.network.springs.size(), std::isfinite(dt) ? fmt::format("dt {:.3g} s", dt) : std::string("all held"));
+  }
 
  private:
   // As lava has it.
@@ -208,16 +213,25 @@ class SpringsEffect final : public Effect, private Deformable {
     if (!body_.network.held[point]) owed_.add(point, impulse, state_.x.size());
   }
 
-  /// Those that no torn spring was a side of.
+  /// Those that no torn spring was a side of: of a cube and a cloth, whose vertices hang on a point each. All of a filled mesh.
   std::vector<geometry::Triangle> whole_triangles() const {
     std::vector<geometry::Triangle> triangles = body_.surface.triangles;
-    if (!torn_.empty())
-      std::erase_if(triangles, [&](const geometry::Triangle& t) {
-        for (std::size_t k = 0; k < 3; ++k)
-          if (std::binary_search(torn_.begin(), torn_.end(), pair_of(t[k], t[(k + 1) % 3]))) return true;
-        return false;
-      });
+    if (torn_.empty() || settings_.shape == SpringsSettings::Shape::kSolid) return triangles;
+    std::erase_if(triangles, [&](const geometry::Triangle& t) {
+      for (std::size_t k = 0; k < 3; ++k)
+        if (std::binary_search(torn_.begin(), torn_.end(), pair_of(body_.point[t[k]][0], body_.point[t[(k + 1) % 3]][0]))) return true;
+      return false;
+    });
     return triangles;
+  }
+
+  /// Lava would meet one of two that begin at one place and go their own ways.
+  void refuse_double_vertices() const {
+    const std::vector<Vec3> at = springs::surface_positions(body_, start_);
+    const std::vector<Index> same = geometry::first_coincident(at);
+    for (std::size_t q = 0; q < at.size(); ++q)
+      if (body_.point[q] != body_.point[same[q]])
+        throw InputError(settings_.form.place, fmt::format("springs '{}': two points begin at one place, ({:.6g}, {:.6g}, {:.6g}), wanted room between them, however little, or meets_lava = false", settings_.name, at[q].x(), at[q].y(), at[q].z()));
   }
 
   /// What lava meets: the surface that shows it, a cloth's from both sides.
@@ -245,7 +259,10 @@ class SpringsEffect final : public Effect, private Deformable {
     if (settings_.field.resolution > 0) system_->surroundings.field = &settings_.field;
     mean_rest_ = 0;
     for (const springs::Spring& each : body_.network.springs) mean_rest_ += each.rest / static_cast<Real>(body_.network.springs.size());
-    limit_ = springs::longest_stable_step(settings_.scheme, system_->spectrum(state_));
+    set_step(springs::longest_stable_step(settings_.scheme, system_->spectrum(state_)));
+  }
+  void set_step(Real longest_stable) {
+    limit_ = longest_stable;
     own_step_ = settings_.scheme == Scheme::kImplicitEuler ? kImplicitStep : kSafety * limit_;
   }
 
@@ -341,8 +358,7 @@ SpringsSettings read(Parameters& p) {
   s.on_ground = p.flag("on_ground", false, "its height counts from the terrain at x, y");
   s.velocity = read_vector(p, "velocity", "m/s", s.velocity, "at the start");
   s.spin = read_vector(p, "spin", "rad/s", s.spin, "at the start, about its position");
-  for (const std::vector<Real>& pin : p.number_lists("pins", "m", 4, false, "[x, y, z, radius]: points that start this near are held"))
-    s.pins.push_back({Vec3(pin[0], pin[1], pin[2]), pin[3]});
+  s.pins = read_pins(p);
   s.pinned_to = p.text("pinned_to", "", "obstacle that carries the held points");
   for (const std::vector<Real>& x : p.number_lists("positions", "m", 3, false, "of every point at the start, instead of rest")) s.positions.push_back(Vec3(x[0], x[1], x[2]));
   for (const std::vector<Real>& v : p.number_lists("velocities", "m/s", 3, false, "of every point at the start")) s.velocities.push_back(Vec3(v[0], v[1], v[2]));
@@ -354,7 +370,7 @@ SpringsSettings read(Parameters& p) {
     if (!(length > 0)) p.fault("walls", "has one whose a, b and c are all 0, so it has no normal");
     else s.around.walls.push_back({Vec3(w[0], w[1], w[2]) / length, w[3] / length});
   }
-  s.meets = p.flag("meets_ground", true, "and obstacles");
+  s.meets = p.flag("meets_ground", true, "and obstacles; other solids that deform they do not meet");
   s.meets_lava = p.flag("meets_lava", true, "(modern lava): each pushes the other; false: neither knows of the other");
   s.lava_friction = p.number("lava_friction", "", s.lava_friction, {0, 1}, "of lava on it: 1 no slip, 0 free slip");
   s.around.response.stiffness = p.number("contact_stiffness", "N/m", 2 * s.material.stiffness, Parameters::not_negative(), "of walls, ground and obstacles");
@@ -380,10 +396,9 @@ SpringsSettings read(Parameters& p) {
 std::optional<SpringBody> make_body(const SpringsSettings& s, const World& world, std::vector<Fault>& faults) {
   using Shape = SpringsSettings::Shape;
   const Place place = s.form.place;
+  if (s.shape != Shape::kCube && !has_shape(s.form)) return std::nullopt;  // told already
   try {
     SpringBody body;
-    geometry::RigidPose pose = s.pose;
-    if (s.on_ground && (!world.terrain || !put_on_terrain(pose, true, *world.terrain, "springs '" + s.name + "'", place, faults))) return std::nullopt;
     if (s.shape == Shape::kCube) {
       const Real points = static_cast<Real>(s.points) * s.points * s.points;
       body = springs::jello_cube(s.points, Vec3::Constant(-s.size / 2), s.size, (s.mass > 0 ? s.mass : s.density * s.size * s.size * s.size) / points, s.material);
@@ -398,8 +413,8 @@ std::optional<SpringBody> make_body(const SpringsSettings& s, const World& world
       }
     }
     for (std::size_t i = 0; i < body.state.x.size(); ++i) {
-      const Vec3 r = pose.orientation * body.state.x[i];
-      body.state.x[i] = pose.position + r;
+      const Vec3 r = s.pose.orientation * body.state.x[i];
+      body.state.x[i] = s.pose.position + r;
       body.state.v[i] = s.velocity + s.spin.cross(r);
     }
     for (const auto& [given, what, into] : {std::tuple{&s.positions, "positions", &body.state.x}, std::tuple{&s.velocities, "velocities", &body.state.v}}) {
@@ -407,20 +422,27 @@ std::optional<SpringBody> make_body(const SpringsSettings& s, const World& world
       if (given->size() != body.state.x.size()) throw InputError(place, fmt::format("springs '{}': {} {}, wanted one for each of its {} points", s.name, given->size(), what, body.state.x.size()));
       *into = *given;
     }
-    if (!s.pinned_to.empty()) {
-      std::vector<std::string> names;
-      if (world.obstacles)
-        for (const PlacedObstacle& each : *world.obstacles) names.push_back(each.name);
-      if (std::find(names.begin(), names.end(), s.pinned_to) == names.end()) {
-        const std::string near = nearest_name(s.pinned_to, names);
-        throw InputError(place, fmt::format("springs '{}': pinned_to names '{}', no obstacle of the scene{}", s.name, s.pinned_to, near.empty() ? "" : fmt::format(" (did you mean {}?)", near)));
-      }
-    }
+    const std::string what = fmt::format("springs '{}'", s.name);
+    const std::size_t before = faults.size();
+    check_start(body.state.x, s.pins, s.meets ? world.terrain : nullptr, what, place, faults);
+    check_driver(s.pinned_to, world, what, place, faults);
+    if (faults.size() > before) return std::nullopt;
     return body;
   } catch (const InputError& error) {
     for (const Fault& fault : error.faults()) faults.push_back(fault.place.line > 0 ? fault : Fault{place, fault.message});
     return std::nullopt;
   }
+}
+
+/// The table in the scene's own coordinates; none: it has no place there.
+std::optional<SpringsSettings> in_scene(SpringsSettings s, const World& world, std::vector<Fault>& faults) {
+  if (!put_in_scene(s.pose, s.on_ground, world, fmt::format("springs '{}'", s.name), s.form.place, faults)) return std::nullopt;
+  s.pins = in_scene(std::move(s.pins), world.terrain);
+  if (!world.terrain) return s;
+  const Vec3 origin = world.terrain->georeference().origin;
+  for (Vec3& x : s.positions) x -= origin;
+  for (auto& wall : s.around.walls) wall.offset += wall.normal.dot(origin);
+  return s;
 }
 
 }  // namespace
@@ -439,14 +461,16 @@ EffectPlan read_springs(Parameters& parameters, Real duration) {
   plan.estimate.seconds = plan.estimate.steps * n * (settings.scheme == Scheme::kImplicitEuler ? 5e-5 : settings.scheme == Scheme::kRk4 ? 6e-7 : 1.5e-7);
   plan.misfits = [settings](const World& world) {
     std::vector<Fault> faults;
-    make_body(settings, world, faults);
+    if (const auto local = in_scene(settings, world, faults)) make_body(*local, world, faults);
     return faults;
   };
   plan.build = [settings](const World& world) -> std::unique_ptr<Effect> {
     std::vector<Fault> faults;
-    std::optional<SpringBody> body = make_body(settings, world, faults);
+    const auto local = in_scene(settings, world, faults);
+    std::optional<SpringBody> body;
+    if (local) body = make_body(*local, world, faults);
     if (!body) throw InputError(faults);
-    return std::make_unique<SpringsEffect>(settings, world, std::move(*body));
+    return std::make_unique<SpringsEffect>(*local, world, std::move(*body));
   };
   return plan;
 }

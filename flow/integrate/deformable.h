@@ -9,9 +9,9 @@
 
 namespace effuse::flow {
 
-/// A closed surface that hangs on points: vertex q is at
+/// A surface that hangs on points, closed or open: vertex q is at
 ///   sum over k in [first[q], first[q + 1]) of weight[k] x[point[k]],
-/// the weights of a vertex add up to 1. No two vertices hang alike, each is used.
+/// the weights of a vertex add up to 1. No two vertices began at one place, each is used.
 struct HungSurface {
   std::vector<geometry::Triangle> triangles;  ///< of vertices; outward
   std::vector<Index> first = {0}, point;

@@ -49,11 +49,13 @@ class Water {
 ///   friction     of lava on it: 1 no slip, 0 free slip
 ///   temperature  of its surface [K]; 0: the ground's
 ///   volume       [m^3]
+///   place        of the table that asks for it
 struct SoftSolid {
   Deformable* solid = nullptr;
   Real friction = 1;
   Real temperature = 0, volume = 0;
   Material material;
+  Place place;
 };
 
 /// Another effect that a table names, or needs: looked for when all are read.

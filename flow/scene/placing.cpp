@@ -46,6 +46,8 @@ void read_form(Parameters& p, std::string_view file_what, PlannedForm& form) {
   }
 }
 
+bool has_shape(const PlannedForm& form) { return !form.file.empty() || form.ball > 0 || form.box.minCoeff() > 0; }
+
 geometry::TriMesh mesh_of(const PlannedForm& form) {
   constexpr int kSubdivisions = 3;
   return form.ball > 0 ? geometry::make_sphere(Vec3::Zero(), form.ball, kSubdivisions) : geometry::make_box(-form.box / 2, form.box / 2);

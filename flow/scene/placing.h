@@ -27,6 +27,9 @@ struct PlannedForm {
 /// The keys file, scale, up, box, ball, name and color. file_what: what is said of the key file.
 void read_form(Parameters& p, std::string_view file_what, PlannedForm& form);
 
+/// Whether it has a file, a box or a ball; what is wrong otherwise has been told.
+bool has_shape(const PlannedForm& form);
+
 /// The mesh of a box or a ball (of 1,280 triangles).
 geometry::TriMesh mesh_of(const PlannedForm& form);
 

@@ -119,14 +119,26 @@ void Solids::stand_pressed(std::size_t k, Real dt) {
 }
 
 namespace {
-/// Turned inside out it would draw lava in.
-void check_volume(const geometry::Obstacle& obstacle, const HungSurface& surface, std::span<const Vec3> at, Real time) {
+std::string said(const std::string& name) { return name.empty() ? "a solid that deforms" : fmt::format("'{}'", name); }
+
+/// Turned inside out it would draw the lava in that is near.
+void check_volume(const geometry::Obstacle& obstacle, const std::string& name, const HungSurface& surface, std::span<const Vec3> at, Real time) {
   if (!obstacle.shape.solid()) return;
   Real volume = 0;
   Vec3 middle = Vec3::Zero();
   for (const Vec3& x : at) middle += x / static_cast<Real>(at.size());
   for (const auto& [a, b, c] : surface.triangles) volume += (at[a] - middle).dot((at[b] - middle).cross(at[c] - middle)) / 6;
-  if (!(volume > 0)) throw UnstableAt(fmt::format("at t = {:.6g} s lava has pressed flat a solid that deforms, around ({:.6g}, {:.6g}, {:.6g}); a stiffer one would do", time, middle.x(), middle.y(), middle.z()), middle);
+  if (!(volume > 0)) throw UnstableAt(fmt::format("at t = {:.6g} s {} is pressed flat, or inside out, where lava is near, around ({:.6g}, {:.6g}, {:.6g}); a stiffer one would do", time, said(name), middle.x(), middle.y(), middle.z()), middle);
+}
+
+constexpr Real kWildest = 1e4;  // radii of a particle that a place of a solid may go in a step: what has blown up goes much further
+
+/// It would take along whatever it meets.
+void check_speed(const std::string& name, std::span<const Vec3> at, std::span<const Vec3> way, Real most, Real time) {
+  for (std::size_t q = 0; q < at.size(); ++q)
+    if (!(way[q].norm() <= most))  // not a number: too fast
+      throw UnstableAt(fmt::format("at t = {:.6g} s {} goes {:.3g} m/s at ({:.6g}, {:.6g}, {:.6g}): a shorter step of its own, more damping or another scheme would do", time,
+                                   said(name), way[q].norm(), at[q].x(), at[q].y(), at[q].z()), Vec3(at[q].cwiseMax(-1e6).cwiseMin(1e6)));
 }
 }  // namespace
 
@@ -145,7 +157,7 @@ void Solids::go_pressed(std::size_t k, Real time, Real dt) {
   const HungSurface& surface = solid.solid->surface();
   std::vector<Vec3> at, way;
   surface.gather(solid.solid->places(), at);
-  check_volume((*options_.obstacles)[options_.deforming[k].obstacle], surface, at, time + dt);
+  if (solid.near && !anew) check_volume((*options_.obstacles)[options_.deforming[k].obstacle], options_.deforming[k].name, surface, at, time + dt);
   if (anew) {
     // It has broken: what it was no longer tells how each vertex came.
     surface.gather(solid.solid->velocities(), way);
@@ -153,12 +165,18 @@ void Solids::go_pressed(std::size_t k, Real time, Real dt) {
     way.resize(at.size());
     for (std::size_t q = 0; q < at.size(); ++q) way[q] = (at[q] - drawn.vertices[q]) / dt;
   }
+  check_speed(options_.deforming[k].name, at, way, kWildest * radius_ / dt, time + dt);
   options_.obstacles->deform(options_.deforming[k].obstacle, at, way, dt, anew ? std::span<const geometry::Triangle>(surface.triangles) : std::span<const geometry::Triangle>());
   drawn = {solid.solid->surface_version(), std::move(at)};
 }
 
 void Solids::go(Real time, Real dt) {
-  for (std::size_t k = 0; k < pressed_.size(); ++k) go_pressed(k, time, dt);
+  try {
+    for (std::size_t k = 0; k < pressed_.size(); ++k) go_pressed(k, time, dt);
+  } catch (...) {
+    options_.obstacles->update();  // who reports it may ask where they are
+    throw;
+  }
   if (!movable_.empty() && options_.moved) {
     std::vector<Movable> moved = movable_;
     for (std::size_t b = 0; b < moved.size(); ++b) weigh(moved[b], 1 / heavier_[b]);
@@ -267,14 +285,14 @@ void Solids::add_walls(std::span<const Vec3> x, Real reach, Walls& walls) {
       const Contact& contact = contacts_[q * kMost + c];
       const Real friction = backing_[q * kMost + c] * friction_of(contact.surface);
       const Index body = number_of(contact.surface);
-      const auto solid = std::find_if(pressed_.begin(), pressed_.end(), [&](const Pressed& p) { return p.surface == contact.surface; });
-      const bool moves = body != kNotMovable, bends = solid != pressed_.end();
+      const Index solid = pressed_of(contact.surface);
+      const bool moves = body != kNotMovable, bends = solid != kNotMovable;
       Vec3 arm = moves ? Vec3(contact.point - movable_[body].centre) : Vec3(Vec3::Zero());
-      const Index triangle = bends ? triangle_of(contact, arm) : kNotMovable;
-      if (bends) solid->near = true;
+      const Index triangle = bends ? triangle_of(solid, contact.point, arm) : kNotMovable;
+      if (bends) pressed_[solid].near = true;
       merged_.walls[place++] = {.normal = contact.normal, .distance = contact.distance, .reach = contact.distance, .surface = contact.surface, .triangle = triangle,
                                 .velocity = contact.surface_velocity, .temperature = contact.surface_temperature, .effusivity = effusivity_of(contact.surface), .friction = friction, .across = across_[q * kMost + c],
-                                .mirrors = true, .movable = bends ? static_cast<Index>(solid - pressed_.begin()) : body,
+                                .mirrors = true, .movable = bends ? solid : body,
                                 .arm = arm};
       speed_ = std::max(speed_, contact.surface_velocity.norm());
     }
@@ -298,13 +316,17 @@ void Solids::know(std::size_t k) {
       if (!solid.solid->held()[surface.point[i]]) solid.mobility[q] += surface.weight[i] * surface.weight[i] / solid.solid->masses()[surface.point[i]];
 }
 
-/// The triangle of the contact's place, and the place on it.
-Index Solids::triangle_of(const Contact& contact, Vec3& weights) const {
-  const auto each = std::find_if(pressed_.begin(), pressed_.end(), [&](const Pressed& p) { return p.surface == contact.surface; });
-  const geometry::CollisionMesh& shape = (*options_.obstacles)[options_.deforming[static_cast<std::size_t>(each - pressed_.begin())].obstacle].shape;
-  const Index triangle = shape.nearest(contact.point)->triangle;
-  weights = shape.weights(triangle, contact.point);
-  return triangle;
+Index Solids::pressed_of(Index surface) const {
+  const auto each = std::find_if(pressed_.begin(), pressed_.end(), [&](const Pressed& p) { return p.surface == surface; });
+  return each == pressed_.end() ? kNotMovable : static_cast<Index>(each - pressed_.begin());
+}
+
+/// The triangle of pressed_[k] that is nearest to a place, and the place on it.
+Index Solids::triangle_of(std::size_t k, const Vec3& at, Vec3& weights) const {
+  const geometry::CollisionMesh& shape = (*options_.obstacles)[options_.deforming[k].obstacle].shape;
+  const auto nearest = shape.nearest(at);
+  weights = shape.weights(nearest->triangle, nearest->point);
+  return nearest->triangle;
 }
 
 void Solids::part(std::span<const Vec3> x, const Walls& walls, Neighbors& neighbors) {
@@ -387,21 +409,21 @@ geometry::SlideReport Solids::slide(std::span<const Index> which, std::span<cons
 
 /// What a particle stopped at a place has given a surface.
 void Solids::push(Index surface, const Vec3& impulse, const Vec3& at) {
-  const auto each = std::find_if(pressed_.begin(), pressed_.end(), [&](const Pressed& p) { return p.surface == surface; });
-  if (each == pressed_.end()) {
+  const Index k = pressed_of(surface);
+  if (k == kNotMovable) {
     if (!options_.push) return;
     const Index body = number_of(surface);  // none: an obstacle, or a piece that came in this step
     const Real heavier = body != kNotMovable ? heavier_[body] : 1;
     options_.push(surface, impulse / heavier, heavier > 1 ? before_[body].centre : at);
     return;
   }
-  const geometry::CollisionMesh& shape = (*options_.obstacles)[options_.deforming[static_cast<std::size_t>(each - pressed_.begin())].obstacle].shape;
-  const auto place = shape.nearest(at);
-  const Vec3 weights = shape.weights(place->triangle, place->point);
-  const HungSurface& hung = each->solid->surface();
-  for (int k = 0; k < 3; ++k) {
-    const Index q = shape.mesh().triangles[place->triangle][static_cast<std::size_t>(k)];
-    for (Index i = hung.first[q]; i < hung.first[q + 1]; ++i) each->solid->push(hung.point[i], weights[k] * hung.weight[i] * impulse);
+  Vec3 weights;
+  const Index triangle = triangle_of(k, at, weights);
+  Deformable& solid = *pressed_[k].solid;
+  const HungSurface& hung = solid.surface();
+  for (int c = 0; c < 3; ++c) {
+    const Index q = (*options_.obstacles)[options_.deforming[k].obstacle].shape.mesh().triangles[triangle][static_cast<std::size_t>(c)];
+    for (Index i = hung.first[q]; i < hung.first[q + 1]; ++i) solid.push(hung.point[i], weights[c] * hung.weight[i] * impulse);
   }
 }
 

@@ -37,6 +37,7 @@ struct SolidOptions {
   struct Deforming {
     std::size_t obstacle = 0;
     Deformable* solid = nullptr;
+    std::string name = {};  ///< for messages; may be empty
   };
 
   geometry::Obstacles* obstacles = nullptr;
@@ -131,7 +132,8 @@ class Solids {
   void stand_pressed(std::size_t k, Real dt);
   void go_pressed(std::size_t k, Real time, Real dt);
   bool leave_gone(std::size_t k);
-  Index triangle_of(const geometry::Contact& contact, Vec3& weights) const;
+  Index pressed_of(Index surface) const;  // kNotMovable: none
+  Index triangle_of(std::size_t k, const Vec3& at, Vec3& weights) const;
   void know(std::size_t k);
   void push(Index surface, const Vec3& impulse, const Vec3& at);
 

@@ -6,6 +6,7 @@
 #include "geometry/base/check.h"
 #include "geometry/base/parallel.h"
 #include "geometry/base/zones.h"
+#include "geometry/collide/collision_mesh_internal.h"
 #include "geometry/collide/obstacles_internal.h"
 
 namespace effuse::geometry {
@@ -54,7 +55,7 @@ void Obstacles::deform(std::size_t i, std::span<const Vec3> positions, std::span
   const std::vector<Vec3>& now = o.shape.mesh().positions;
   const bool elsewhere = !std::equal(now.begin(), now.end(), positions.begin(), positions.end());
   if (!triangles.empty()) anew(triangles);
-  else if (elsewhere && !o.shape.follow(positions)) anew(std::vector<Triangle>(o.shape.mesh().triangles));
+  else if (elsewhere && !o.shape.follow(positions)) anew(std::vector<Triangle>(o.shape.impl().triangles));  // also those without area: they close it
   o.velocity.assign(velocities.begin(), velocities.end());
   o.motion = RigidMotion({}, {}, duration);
   impl_->changed.push_back(static_cast<Index>(i));

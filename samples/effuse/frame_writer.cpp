@@ -102,13 +102,13 @@ FrameWriter::Result FrameWriter::write_frame(const flow::Simulation& simulation)
   }
   const bool moving = pieces_ || solids_.any_moves();
   const geometry::TriMesh solids = solids_.at(simulation.time(), poses, pieces);
-  if (settings_.ply && moving) skin::write_ply(frames / numbered("obstacles", frame, "ply"), solids, about);
+  if (own_ply() && moving) skin::write_ply(frames / numbered("obstacles", frame, "ply"), solids, about);
   if (moving) film_.add("obstacles", frame, solids, about);
   geometry::TriMesh others = solids;
   for (const auto& effect : simulation.effects())
     for (flow::NamedMesh& own : effect->meshes()) {
       if (std::find(meshes_.begin(), meshes_.end(), own.name) == meshes_.end()) meshes_.push_back(own.name);
-      if (settings_.ply) write_own(own, frame);
+      if (own_ply()) write_own(own, frame);
       film_.add(own.name, frame, own.mesh, about);
       if (preview_) append_to_picture(others, own.mesh);
     }
@@ -117,7 +117,7 @@ FrameWriter::Result FrameWriter::write_frame(const flow::Simulation& simulation)
   for (const auto& effect : simulation.effects()) {
     for (const flow::NamedCloud& cloud : effect->clouds()) {
       if ((cloud.points || cloud.spheres) && std::find(meshes_.begin(), meshes_.end(), cloud.name) == meshes_.end()) meshes_.push_back(cloud.name);
-      if (settings_.ply && (cloud.points || cloud.spheres)) {
+      if (own_ply() && (cloud.points || cloud.spheres)) {
         const fs::path file = frames / numbered(cloud.name.c_str(), frame, "ply");
         if (cloud.spheres) skin::write_ply(file, spheres_of(cloud), about);
         else skin::write_points_ply(file, cloud.view(), with_look(about, cloud));
@@ -206,7 +206,7 @@ void FrameWriter::write_manifest(int frames_done, const std::vector<std::pair<st
                   {"max", {box.max().x(), box.max().y(), box.max().z()}}};
   if (solids_.any()) m["obstacles"] = {{"files", {"obstacles.ply", "obstacles.glb"}}};
   ordered_json files = ordered_json::object();
-  if (settings_.ply && (pieces_ || solids_.any_moves())) files["obstacles"] = "frames/obstacles.####.ply";
+  if (own_ply() && (pieces_ || solids_.any_moves())) files["obstacles"] = "frames/obstacles.####.ply";
   if (lava_ && settings_.ply) files["ply"] = "frames/skin.####.ply";
   if (lava_ && settings_.obj) files["obj"] = "frames/skin.####.obj";
   if (lava_ && settings_.glb) files["glb"] = "frames/skin.####.glb";
@@ -215,7 +215,7 @@ void FrameWriter::write_manifest(int frames_done, const std::vector<std::pair<st
   if (lava_ && settings_.usda) files["usda"] = "frames/skin.####.usda";
   if (lava_ && settings_.bgeo) files["bgeo"] = "frames/lava.####.bgeo";
   for (const std::string& name : meshes_) {
-    if (settings_.ply) files[name] = fmt::format("frames/{}.####.ply", name);
+    if (own_ply()) files[name] = fmt::format("frames/{}.####.ply", name);
     if (settings_.vtp) files[name + "_vtp"] = fmt::format("frames/{}.####.vtp", name);
     if (settings_.usda) files[name + "_usda"] = fmt::format("frames/{}.####.usda", name);
   }

@@ -50,6 +50,8 @@ class FrameWriter {
 
  private:
   skin::Metadata metadata(int frame, Real time) const;
+  /// PLY also holds what is shown beside the lava where none of the scene's formats does: GLB, OBJ, VDB and BGEO are of the lava alone.
+  bool own_ply() const { return settings_.ply || ((settings_.obj || settings_.glb || settings_.vdb || settings_.bgeo) && !settings_.vtp && !settings_.usda); }
   void write_own(const flow::NamedMesh& own, int frame) const;
   /// Told once, on the first frame it happens in.
   void warn_of_lava_on(const Vec3& eye, const geometry::Points& points, Real spacing, int frame);

@@ -82,6 +82,7 @@ Field make_field(const LevelSet::Impl& s, const Blocks& blocks, const Making& ma
 
 /// The same on all blocks of s, into the cache.
 void fill_all(const LevelSet::Impl& s, const Making& making, SurfaceCache::Impl& cache) {
+  cache.raster = {};  // coarser voxels have no sums at nodes
   rasterize(s, s.blocks, cache.raster);
   GroundField ground;
   if (s.rule.kernel == SurfaceKernel::kRound) {

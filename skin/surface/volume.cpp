@@ -281,7 +281,7 @@ Shift matching_shift(const Blocks& blocks, float outside, const Field& phi, cons
     shift.exact = b.low - b.at_low / slope();
     bool found_round = false;
     for (int tries = 0; tries < 3 && off > 0.5 && !found_round; ++tries) {
-      shift.steps = roundest(static_cast<int>(std::ceil(shift.exact - off)), static_cast<int>(std::floor(shift.exact + off)));
+      shift.steps = std::clamp(roundest(static_cast<int>(std::ceil(shift.exact - off)), static_cast<int>(std::floor(shift.exact + off))), -end, end);
       shift.exact = shift.steps - excess(shift.steps) / slope();
       found_round = std::abs(shift.exact - shift.steps) <= off;
     }

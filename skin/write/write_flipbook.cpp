@@ -42,7 +42,7 @@ struct Flipbook::Impl {
       glow_begin.push_back(glow.values.size() / 3);
       glow.values.insert(glow.values.end(), shines->values.begin(), shines->values.end());
     }
-    const int material = find_color(mesh) ? 1 : 0;
+    const int material = shines ? 2 : find_color(mesh) ? 1 : 0;
     meshes.push_back({{"name", title}, {"primitives", Json::array({{{"attributes", std::move(attributes)}, {"indices", add_triangles(glb, mesh)}, {"material", material}}})}});
     nodes.push_back({{"name", title}, {"mesh", meshes.size() - 1}});
     return static_cast<int>(nodes.size()) - 1;
@@ -124,7 +124,8 @@ void Flipbook::finish(const std::filesystem::path& file, Real end, const Metadat
     glb.json["scenes"][0]["nodes"] = roots;
     glb.json["nodes"] = std::move(all.nodes);
     glb.json["meshes"] = std::move(all.meshes);
-    glb.json["materials"] = Json::array({{{"name", "ground"}, {"pbrMetallicRoughness", {{"baseColorFactor", {0.3, 0.28, 0.26, 1}}, {"metallicFactor", 0}, {"roughnessFactor", 0.85}}}}, material});
+    glb.json["materials"] = Json::array({{{"name", "ground"}, {"pbrMetallicRoughness", {{"baseColorFactor", {0.3, 0.28, 0.26, 1}}, {"metallicFactor", 0}, {"roughnessFactor", 0.85}}}},
+                                          {{"name", "coloured"}, {"pbrMetallicRoughness", {{"metallicFactor", 0}, {"roughnessFactor", 0.85}}}}, material});
     if (!film["channels"].empty()) glb.json["animations"] = Json::array({film});
   }
   write_file(file, glb.file(file));

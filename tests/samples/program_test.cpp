@@ -54,6 +54,7 @@ class ProgramTest : public testing::Test {
         const rlimit limit{largest_file, largest_file};
         ::setrlimit(RLIMIT_FSIZE, &limit);
       }
+      ::signal(SIGHUP, SIG_DFL);  // also where the tests run under nohup
       ::execv(argv[0], argv.data());
       ::_exit(98);
     }
@@ -338,6 +339,17 @@ TEST_F(ProgramTest, RunsLavaRoundAHouseAndWritesItBesideTheTerrain) {
   EXPECT_EQ(effuse({"check", out / "scene.toml"}).code, 0);
   EXPECT_EQ(effuse(arguments("5", {"--resume"})).code, 0);
   EXPECT_EQ(effuse(arguments("6", {"--resume", "--set", "obstacle[0].scale=2"})).code, 2);
+}
+
+TEST_F(ProgramTest, WhatIsShownBesideTheLavaIsWrittenWhateverTheFormats) {
+  const fs::path scene = write("soft.toml", "format = 1\n[film]\nframes = 2\n[terrain.plane]\nsize = [\"20 m\", \"20 m\"]\n[preview]\npictures = false\n"
+                                            "[[elastic]]\nname = \"block\"\nbox = [1, 1, 1]\nspacing = 0.5\nposition = [0, 0, 1]\nyoungs_modulus = 1e5\ndensity = 1000\n");
+  for (const auto& [formats, written] : {std::pair("[\"glb\"]", "ply"), {"[\"ply\", \"vtp\"]", "ply"}, {"[\"vtp\"]", "vtp"}, {"[\"obj\", \"usda\"]", "usda"}}) {
+    const fs::path out = folder_ / "soft";
+    ASSERT_EQ(effuse({"run", scene, "-o", out, "--force", "--set", std::string("output.formats=") + formats}).code, 0) << formats;
+    for (const char* kind : {"ply", "vtp", "usda"})
+      EXPECT_EQ(fs::exists(out / "frames" / (std::string("block.0002.") + kind)), kind == std::string(written) || std::string(formats).find(kind) != std::string::npos) << formats << " " << kind;
+  }
 }
 
 TEST_F(ProgramTest, WritesObstaclesThatMoveFrameByFrame) {

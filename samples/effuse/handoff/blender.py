@@ -17,7 +17,10 @@ import re
 import sys
 
 import bpy
-import numpy as np
+try:
+    import numpy as np
+except ImportError:  # Debian's Blender comes without; blender.org's has it
+    raise ImportError("this Blender has no numpy: on Debian, apt-get install python3-numpy") from None
 from bpy.app.handlers import persistent
 from mathutils import Matrix, Vector
 

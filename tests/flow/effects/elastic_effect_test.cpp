@@ -83,6 +83,24 @@ TEST(ElasticEffectSlow, PinsHoldAndAnObstacleCarriesThem) {
   EXPECT_NEAR(geometry::bounds(carried.mesh()).max().z(), 3.1, 0.15);
 }
 
+TEST(ElasticEffect, StandsWhereTheMapSays) {
+  const Vec3 origin(2667000, 6478000, 50);
+  SmallScene scene("[[elastic]]\nbox = [1, 1, 1]\nspacing = 0.5\nyoungs_modulus = 1e6\ndensity = 1000\ngravity = [0, 0, 0]\nposition = [2667001, 6478002, 53]\npins = [[2667001, 6478002, 53, 2]]\n", origin);
+  scene.frames(2);
+  EXPECT_NEAR((geometry::bounds(scene.mesh()).center() - Vec3(1, 2, 3)).norm(), 0, 1e-9);
+}
+
+TEST(ElasticEffect, ATableWithoutAShapeIsToldOnceAndNothingIsMade) {
+  for (const char* table : {"[[elastic]]\nspacing = 0.2\n", "[[elastic]]\nbox = [0, 1, 1]\n", "[[springs]]\nshape = \"cloth\"\n", "[[springs]]\nshape = \"solid\"\nbox = [1, 1]\n"}) {
+    const Node node = importers::read_scene_text("[film]\nframes = 9\n[terrain]\nplane = { size = [100, 100] }\n" + std::string(table), "test.toml");
+    const geometry::Terrain terrain = geometry::Terrain::from_height_field(geometry::make_plane(Vec2(100, 100)));
+    Parameters root(node);
+    const Scene scene = read_scene(root, effect_kinds());
+    EXPECT_THROW(root.finish(), InputError) << table;
+    for (const EffectPlan& plan : scene.effects) EXPECT_TRUE(plan.misfits(World{&terrain, 1}).empty()) << table;
+  }
+}
+
 TEST(ElasticEffect, SaysWhatDoesNotFit) {
   const auto tells = [](const std::string& text, const char* part) {
     const std::string faults = fault_of(text);
@@ -94,6 +112,11 @@ TEST(ElasticEffect, SaysWhatDoesNotFit) {
   tells("[[elastic]]\nball = 1\nspacing = 1e-3\nyoungs_modulus = 1000\ndensity = 1000\n", "take a wider one");
   tells("[[elastic]]\nbox = [1, 1, 1]\nspacing = 1e-3\nyoungs_modulus = 1000\ndensity = 1000\n", "take a wider one");
   tells("[[elastic]]\nball = 1\nspacing = 0.2\nyoungs_modulus = 1000\ndensity = 1000\npinned_to = \"crane\"\n", "no obstacle of the scene");
+  const std::string box = "[[elastic]]\nbox = [1, 1, 1]\nspacing = 0.5\nyoungs_modulus = 1000\ndensity = 1000\n";
+  tells(box + "position = [0, 0, 2]\npins = [[0, 0, 9, 1]]\n", "pins[0] holds no point, the nearest starts 6.5 m from it");
+  tells(box + "position = [0, 0, -1]\n", "starts up to 1.5 m under the ground");
+  EXPECT_EQ(fault_of(box + "position = [0, 0, -1]\nmeets_ground = false\n"), "");
+  EXPECT_EQ(fault_of(box + "position = [0, 0, 0]\npins = [[0, 0, -0.5, 0.8]]\n"), "") << "what is held may stand in it";
   tells("[[elastic]]\nfile = \"x.obj\"\nspacing = 0.2\nyoungs_modulus = 1000\ndensity = 1000\n", "not closed");
 }
 

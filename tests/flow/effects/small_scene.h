@@ -13,15 +13,17 @@
 /// Scenes of one effect, for its tests.
 namespace effuse::flow {
 
-/// A scene of the text over level ground at 0, 24 frames a second.
+/// A scene of the text over level ground at the map's origin, 24 frames a second.
 struct SmallScene {
   Node node;
   Scene scene;
-  geometry::Terrain terrain = geometry::Terrain::from_height_field(geometry::make_plane(Vec2(100, 100)));
+  geometry::Terrain terrain;
   std::vector<PlacedObstacle> obstacles;
   std::unique_ptr<Simulation> simulation;
 
-  explicit SmallScene(const std::string& text) : node(importers::read_scene_text("[film]\nframes = 9999\n[terrain]\nplane = { size = [100, 100] }\n" + text, "test.toml")) {
+  explicit SmallScene(const std::string& text, const Vec3& origin = Vec3::Zero())
+      : node(importers::read_scene_text("[film]\nframes = 9999\n[terrain]\nplane = { size = [100, 100] }\n" + text, "test.toml")),
+        terrain(geometry::Terrain::from_height_field(geometry::make_plane(Vec2(100, 100)), {origin, ""})) {
     Parameters root(node);
     scene = read_scene(root, effect_kinds());
     root.finish();

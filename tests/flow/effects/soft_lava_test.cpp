@@ -34,6 +34,46 @@ TEST(SoftLavaSlow, ASceneTellsWhetherTheyPushEachOther) {
   EXPECT_GT(inside(neither), 10);
 }
 
+/// What a scene fails with; "" when it does not.
+std::string failure_of(EffectScene& scene, int frames) {
+  try {
+    scene.frames(frames);
+  } catch (const UnstableError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(SoftLavaSlow, WhatCollapsesByItselfFarFromTheLavaDoesNotEndTheRun) {
+  // Springs too weak for the cube's weight: it lies flat within a second.
+  EffectScene scene(kLava + "[[springs]]\nname = \"jelly\"\npoints = 4\nsize = 0.8\nposition = [9, 9, 0.5]\ndensity = 100\nstiffness = 20\ndamping = 1\n");
+  EXPECT_EQ(failure_of(scene, 36), "");
+}
+
+TEST(SoftLavaSlow, WhatBreaksDownBesideAnotherIsToldAndBothCanBeAsked) {
+  EffectScene scene(kLava + kElastic + "[[springs]]\nname = \"wild\"\npoints = 3\nsize = 1\nposition = [6, 6, 3]\nmass = 1\nstiffness = 1e9\nscheme = \"euler\"\nstep = 0.02\nspin = [0, 5, 0]\n");
+  const std::string told = failure_of(scene, 48);
+  EXPECT_NE(told.find("'wild'"), std::string::npos) << told;
+}
+
+TEST(SoftLavaSlow, SolidsThatLavaCannotMeetAreRefusedByName) {
+  const std::string over = "[[elastic]]\nname = \"lid\"\nbox = [3, 3, 1]\nspacing = 0.5\nposition = [0, 0, 0.5]\nyoungs_modulus = 1e5\ndensity = 1000\n";
+  const auto told = [](const std::string& text) {
+    try {
+      EffectScene scene(text);
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_NE(told(kLava + over).find("'lid' is over the vent when it opens"), std::string::npos) << told(kLava + over);
+  EXPECT_NE(told(kLava + over).find("test.toml:"), std::string::npos) << "where";
+  EXPECT_EQ(told(kLava + over + "meets_lava = false\n"), "");
+  std::string folded = "[[springs]]\nshape = \"cloth\"\nfile = \"sheet.obj\"\ndensity = 1\nstiffness = 100\npositions = [";
+  for (int k = 0; k < 81; ++k) folded += "[" + std::to_string(8 + 0.1 * (k % 2)) + ", " + std::to_string(0.1 * (k / 2 % 9)) + ", 2],";
+  EXPECT_NE(told(kLava + folded + "]\n").find("two points begin at one place"), std::string::npos) << told(kLava + folded + "]\n");
+}
+
 TEST(SoftLavaSlow, WhichOfTheTwoComesFirstMattersNot) {
   EffectScene one(kLava + kElastic), other(kElastic + kLava);
   for (EffectScene* each : {&one, &other}) {

@@ -56,6 +56,46 @@ TEST(SpringsEffect, TornFacesAreGoneAndStayGoneInACheckpoint) {
   EXPECT_EQ(scene.mesh().triangles.size(), again.mesh().triangles.size());
 }
 
+TEST(SpringsEffect, TornSidesOfACubeAreThoseOfThePointsThatCameApart) {
+  // Its top is held, and two points of a lower edge are thrown apart.
+  std::string velocities = "velocities = [";
+  for (int n = 0; n < 64; ++n) velocities += n == 48 ? "[900, 0, 0]," : n == 32 ? "[-900, 0, 0]," : "[0, 0, 0],";  // (3, 0, 0) and (2, 0, 0)
+  SmallScene scene("[[springs]]\npoints = 4\nsize = 1.5\nposition = [0, 0, 3]\nmass = 64\nstiffness = 5000\ndamping = 1\ngravity = [0, 0, 0]\nstep = 0.0002\ntear_strain = 0.3\n" + velocities + "]\n");
+  scene.simulation->advance([n = 0]() mutable { return ++n < 2; });
+  const geometry::TriMesh mesh = scene.mesh();
+  ASSERT_GT(scene.figure("torn"), 0);
+  ASSERT_LT(mesh.triangles.size(), 6u * 9 * 2);
+  // What is left has no long side, what is gone is at that edge: every vertex of the opposite faces is in use.
+  for (const geometry::Triangle& t : mesh.triangles)
+    for (std::size_t k = 0; k < 3; ++k) EXPECT_LT((mesh.positions[t[k]] - mesh.positions[t[(k + 1) % 3]]).norm(), 1.3 * 0.5 * std::sqrt(2.0));
+  EXPECT_GE(mesh.triangles.size(), 6u * 9 * 2 - 24);
+}
+
+TEST(SpringsEffect, GoesOnFromACheckpointInTheStepsItHad) {
+  // The longest stable step is that of the start, when it is squeezed: found again half way it would be another.
+  for (const char* more : {"spin = [0, 9, 0]\n", "scheme = \"rk4\"\nspin = [0, 9, 0]\n", "pins = [[0, 0, 2.5, 9]]\n"}) {
+    const std::string text = std::string(kCube) + more;
+    SmallScene whole(text), again(text);
+    whole.frames(4);
+    again.simulation->restore(whole.simulation->checkpoint("key"), "key", "checkpoint");
+    whole.frames(4);
+    again.frames(4);
+    EXPECT_EQ(whole.simulation->state_hash(), again.simulation->state_hash()) << more;
+    EXPECT_EQ(whole.figure("steps"), again.figure("steps")) << more;
+  }
+}
+
+TEST(SpringsEffect, StandsWhereTheMapSays) {
+  const Vec3 origin(2667000, 6478000, 50);
+  const std::string how = "[[springs]]\npoints = 3\nsize = 1\ndensity = 100\nstiffness = 2000\ngravity = [0, 0, 0]\n";
+  SmallScene above(how + "position = [2667001, 6478002, 53]\npins = [[2667001, 6478002, 53, 0.1]]\nwalls = [[0, 0, 1, -50]]\n", origin);
+  above.frames(2);
+  EXPECT_NEAR((geometry::bounds(above.mesh()).center() - Vec3(1, 2, 3)).norm(), 0, 1e-9);
+  SmallScene on(how + "position = [2667001, 6478002, 0.7]\non_ground = true\n", origin);
+  on.frames(2);
+  EXPECT_NEAR(geometry::bounds(on.mesh()).center().z(), 0.7, 1e-9);
+}
+
 TEST(SpringsEffect, AStepThatBlowsUpIsTakenInSmallerOnesOrRefused) {
   // Euler without damping is unstable at any step: it is found out, the state is that of before.
   SmallScene scene("[[springs]]\npoints = 3\nsize = 1\nposition = [0, 0, 2]\nmass = 1\nstiffness = 1e6\nscheme = \"euler\"\nstep = 0.02\nvelocity = [0, 0, -1]\n");
@@ -74,6 +114,10 @@ TEST(SpringsEffect, SaysWhatDoesNotFit) {
   EXPECT_TRUE(contains(fault_of("[[springs]]\nstiffness = 1\nmass = 1\npinned_to = \"crane\"\n"), "no obstacle of the scene"));
   EXPECT_TRUE(contains(fault_of("[[springs]]\nstiffness = 1\nmass = 1\nwalls = [[0, 0, 0, 1]]\n"), "has no normal"));
   EXPECT_TRUE(contains(fault_of("[[springs]]\nstiffness = 1\nmass = 1\nstiffnes = 3\n"), "stiffness"));
+  EXPECT_TRUE(contains(fault_of("[[springs]]\nstiffness = 1\nmass = 1\nposition = [0, 0, 2]\npins = [[0, 0, 9, 1]]\n"), "pins[0] holds no point"));
+  EXPECT_TRUE(contains(fault_of("[[springs]]\nstiffness = 1\nmass = 1\nposition = [0, 0, 2]\npins = [[0, 0, 2, -1]]\n"), "radius of -1 m"));
+  EXPECT_TRUE(contains(fault_of("[[springs]]\nstiffness = 1\nmass = 1\nposition = [0, 0, -3]\n"), "under the ground"));
+  EXPECT_EQ(fault_of("[[springs]]\nstiffness = 1\nmass = 1\nposition = [0, 0, -3]\nmeets_ground = false\n"), "");
   EXPECT_TRUE(contains(fault_of("[[springs]]\nshape = \"solid\"\nball = 1\nspacing = 1e-9\ndensity = 1\nstiffness = 1\n"), "take a wider one"));
 }
 

@@ -60,6 +60,31 @@ TEST(DeformingObstacles, ARefittedMeshAnswersAsOneMadeAnew) {
   }
 }
 
+TEST(DeformingObstacles, AClosedMeshThatATriangleWithoutAreaClosesStaysSolid) {
+  // A vertex in the middle of a box's edge, of which one side knows only: a T-junction.
+  TriMesh box = make_box({-1, -1, -1}, {1, 1, 1});
+  const Triangle t = box.triangles[0];
+  const auto middle = static_cast<Index>(box.positions.size());
+  box.positions.push_back((box.positions[t[0]] + box.positions[t[1]]) / 2);
+  box.triangles[0] = {t[0], middle, t[2]};
+  box.triangles.push_back({middle, t[1], t[2]});
+  box.triangles.push_back({t[0], t[1], middle});
+  const CollisionMesh mesh(box);
+  ASSERT_TRUE(mesh.solid());
+  Obstacles obstacles;
+  obstacles.add({mesh, {}, 0, 1});
+  std::vector<Vec3> x = mesh.mesh().positions;
+  for (int step = 0; step < 3; ++step) {
+    for (Vec3& p : x) p.z() += 0.1;
+    obstacles.deform(0, x, std::vector<Vec3>(x.size(), Vec3(0, 0, 1)), 0.1);
+    obstacles.update();
+    EXPECT_TRUE(obstacles[0].shape.solid()) << step;
+    Contact found;
+    ASSERT_EQ(obstacles.contacts(Vec3(0.8, 0, 0.1 * (step + 1)), 1, std::span(&found, 1)), 1);
+    EXPECT_NEAR(found.distance, -0.2, 1e-12) << "inside";
+  }
+}
+
 TEST(DeformingObstacles, SeveralPartsAreMadeAnew) {
   TriMesh two = make_sphere(Vec3::Zero(), 1, 1);
   const TriMesh other = make_sphere(Vec3(3, 0, 0), 1, 1);

@@ -271,6 +271,19 @@ TEST(SurfaceCache, FramesThatAreKeptAndFramesThatAreGivenBackLateAreTheSame) {
   EXPECT_LT(renewed, blocks / 2);
 }
 
+TEST(SurfaceCache, GoesOnWhenVoxelsBecomeCoarserOrFiner) {
+  // Fine voxels have sums at nodes, of a few blocks; coarse ones have none, and more blocks.
+  Creeping few, many;
+  few.cloud = fill(Box3(Vec3(0, 0, 0), Vec3(1, 1, 1)), 1, [](const Vec3&) { return true; }, 0.15);
+  few.options.voxel = 0.125;
+  many.options.voxel = 0.35;
+  SurfaceCache cache;
+  for (Creeping* each : {&few, &many, &many, &few, &few, &many, &many}) {
+    each->advance();
+    EXPECT_EQ(each->surface(&cache).impl().phi, each->surface(nullptr).impl().phi);
+  }
+}
+
 TEST(SurfaceCache, ASurfaceOutlivesTheCacheItWasMadeWith) {
   Creeping lava;
   LevelSet surface;

@@ -93,8 +93,9 @@ TEST_F(WriteFlipbook, ShowsOneFrameAtATimeAndTheGroundAlways) {
   // Without its animation: the last frame.
   EXPECT_EQ(glb.j.at("nodes").at(1).at("scale").at(0), 0);
   EXPECT_FALSE(glb.j.at("nodes").at(3).contains("scale"));
-  EXPECT_EQ(glb.j.at("materials").size(), 2u);
-  EXPECT_TRUE(glb.j.at("materials").at(1).contains("emissiveTexture"));
+  EXPECT_EQ(glb.j.at("materials").size(), 3u);
+  EXPECT_TRUE(glb.j.at("materials").at(2).contains("emissiveTexture"));
+  EXPECT_FALSE(glb.j.at("materials").at(1).contains("emissiveTexture")) << "of what is coloured and does not glow, which has no place in the ramp";
   EXPECT_EQ(glb.j.at("images").size(), 1u) << "one ramp for all";
 
   std::vector<std::string> notes;
