@@ -184,6 +184,10 @@ class SpringsEffect final : public Effect, private Deformable {
             {"kinetic_energy_j", springs::kinetic_energy(body_.network, state_)},
             {"spring_energy_j", springs::spring_energy(body_.network, state_)}};
   }
+  std::vector<std::string> remarks() const override {
+    if (!(settings_.step > limit_) || settings_.scheme == Scheme::kImplicitEuler) return {};
+    return {fmt::format("step, {:.3g} s, is longer than the longest stable one, {:.3g} s: springs that swing faster blow up", settings_.step, limit_)};
+  }
   std::string status() const override {
     const Real dt = settings_.step > 0 ? settings_.step : own_step_;
     return fmt::format("{} points, {} springs, {}", state_.x.size(), body_.network.springs.size(), std::isfinite(dt) ? fmt::format("dt {:.3g} s", dt) : std::string("all held"));

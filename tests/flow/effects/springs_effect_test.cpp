@@ -103,6 +103,13 @@ TEST(SpringsEffect, AStepThatBlowsUpIsTakenInSmallerOnesOrRefused) {
   EXPECT_TRUE(geometry::bounds(scene.mesh()).sizes().allFinite());
 }
 
+TEST(SpringsEffect, RemarksOnAStepThatIsTooLong) {
+  const SmallScene own(kCube), longer(std::string(kCube) + "step = 0.1\n"), implicit(std::string(kCube) + "step = 0.1\nscheme = \"implicit_euler\"\n");
+  for (const SmallScene* sound : {&own, &implicit}) EXPECT_TRUE(sound->simulation->effects()[0]->remarks().empty());
+  ASSERT_EQ(longer.simulation->effects()[0]->remarks().size(), 1u);
+  EXPECT_NE(longer.simulation->effects()[0]->remarks()[0].find("longer than the longest stable one"), std::string::npos);
+}
+
 TEST(SpringsEffect, SaysWhatDoesNotFit) {
   const auto contains = [](const std::string& text, const char* part) { return text.find(part) != std::string::npos; };
   EXPECT_TRUE(contains(fault_of("[[springs]]\nstiffness = 1\n"), "springs[0].density: is missing, wanted density or mass above 0"));
