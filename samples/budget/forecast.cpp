@@ -156,10 +156,10 @@ Forecast forecast(flow::Node& scene, const flow::AccuracyWish& wish, const flow:
   Real spacing = std::cbrt(volume / kRehearsed);
   const bool stated = chooser.has("lava", "spacing");
   if (stated) {
-    // No finer than what it is to tell of.
+    // A little finer than what it is to tell of: particles that lie alone say little about the flow's depth.
     std::vector<Setting> told;
     Chooser asks(scene, told);
-    spacing = std::max(spacing, std::sqrt(2.0) * asks.choose("lava", "spacing", 1, "m"));
+    spacing = std::max(spacing, asks.choose("lava", "spacing", 1, "m") / std::sqrt(2.0));
   }
   for (int k = 0; k < 8; ++k) {
     const flow::Estimate e = estimate_of(scene, spacing);

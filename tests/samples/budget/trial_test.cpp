@@ -24,7 +24,6 @@ struct Trial {
   const char* terrain;  ///< its table
   const char* lava;     ///< its tables, the spacing last
   Real spacing;         ///< [m]
-  Real factor = 2;      ///< that the error is told to
 };
 
 const Trial kTrials[] = {
@@ -34,7 +33,7 @@ const Trial kTrials[] = {
      "[[lava.vent]]\nat = [-40, 0]\nwidth = \"6 m\"\nrate = \"12 m3/s\"\n[lava]\n[lava.rheology]\nviscosity = \"3000 Pa s\"\n[lava.rheology.yield]\nlaw = \"constant\"\nstrength = \"1500 Pa\"\n", 0.9},
     {"lava over a ledge", 12, "[terrain]\nfile = \"SCENESledge.obj\"\n", "[[lava.vent]]\nat = [3, 10]\nwidth = \"2 m\"\nrate = \"6 m3/s\"\ntemperature = \"1150 degC\"\n[lava]\npreset = \"kilauea-mauna-ulu\"\n", 0.42},
     {"a heap on level ground", 40, "[terrain.plane]\nsize = [\"80 m\", \"80 m\"]\n", "[[lava.vent]]\nat = [0, 0]\nwidth = \"6 m\"\nrate = \"8 m3/s\"\n[lava]\n[lava.rheology]\nviscosity = \"8000 Pa s\"\n", 0.8},
-    {"thin lava in the gully", 24, "[terrain]\nfile = \"SCENESgully.asc\"\n", "[[lava.vent]]\nat = [18, 43]\nwidth = \"4 m\"\nrate = \"6 m3/s\"\n[lava]\n[lava.rheology]\nviscosity = \"500 Pa s\"\n", 0.5, 3},  // falls short of 2: 3.8 % predicted, 10.3 % measured
+    {"thin lava in the gully", 24, "[terrain]\nfile = \"SCENESgully.asc\"\n", "[[lava.vent]]\nat = [18, 43]\nwidth = \"4 m\"\nrate = \"6 m3/s\"\n[lava]\n[lava.rheology]\nviscosity = \"500 Pa s\"\n", 0.5},
 };
 
 std::string text_of(const Trial& trial, Real spacing) {
@@ -94,8 +93,8 @@ TEST_P(BudgetSlow, WhatIsPredictedComesAbout) {
   std::cout << line << std::endl;
   EXPECT_NEAR(predicted("processor_seconds") / came("processor_seconds"), 1, 0.3);
   EXPECT_NEAR(predicted("memory_bytes") / came("memory_bytes"), 1, 0.3);
-  EXPECT_LT(told, trial.factor * error);
-  EXPECT_GT(told, error / trial.factor);
+  EXPECT_LT(told, 2 * error);
+  EXPECT_GT(told, error / 2);
 }
 INSTANTIATE_TEST_SUITE_P(, BudgetSlow, testing::ValuesIn(kTrials), [](const auto& each) {
   std::string name = each.param.name;
