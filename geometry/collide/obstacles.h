@@ -54,7 +54,7 @@ class Obstacles {
   void set_temperature(std::size_t i, Real kelvin);  ///< needs no update()
   /// Takes i out for good: nothing meets it. Numbers of the others stay.
   void remove(std::size_t i);
-  /// After changes, before questions. An obstacle that has crept on costs 0.1 microseconds, one that has gone far half a one.
+  /// After changes, before questions. The tree is laid out anew only when one has left the room that it is held with.
   void update();
 
   std::size_t size() const;   ///< removed ones included

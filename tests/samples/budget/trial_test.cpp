@@ -11,7 +11,9 @@
 #include "samples/effuse/load_scene.h"
 #include "tests/samples/budget/run_program.h"
 
-/// Whether what is predicted comes about, on scenes that no constant of the budget was made with.
+/// Whether what is predicted comes about, on scenes that no constant of the error's law was made with. How fine rehearsals may be was chosen
+/// among four ratios with these five in sight: of that they are no test. Of three made
+/// afterwards two miss the factor of two: told over measured 0.43 (stiff lava on Maunga Whau), 0.40 (the gully at 1200 Pa s), 1.59 (a plane of 6 deg).
 namespace effuse::budget {
 namespace {
 
