@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <map>
+#include <optional>
 
 #include "flow/effects/registry.h"
 #include "flow/scene/scene.h"
@@ -97,10 +99,27 @@ Real ratio_at(const Rehearsal& one, const Rehearsal& other, Real t, const std::f
   return a > 0 && b > 0 ? a / b : 1;
 }
 
+/// Rehearsals of a scene, each spacing once.
+class Rehearsals {
+ public:
+  Rehearsals(const flow::Node& scene, const flow::World& world) : scene_(scene), world_(world) {}
+  const Rehearsal& at(Real spacing) {
+    const auto known = done_.find(spacing);
+    return known != done_.end() ? known->second : done_.emplace(spacing, rehearse(scene_, world_, spacing, 4 * kRehearsalWork)).first->second;
+  }
+  const std::map<Real, Rehearsal>& done() const { return done_; }
+
+ private:
+  const flow::Node& scene_;
+  const flow::World& world_;
+  std::map<Real, Rehearsal> done_;
+};
+
 constexpr Real kOpeningTells = 0.08;  // of the film: of a shorter one powers of the spacing tell more
 
 /// The finer rehearsal's counts to the film's end, as they will be at another spacing.
 Counts scaled(const Rehearsal& coarse, const Rehearsal& fine, const Rehearsal& opening, Real spacing, Real end) {
+  if (opening.whole && opening.spacing == spacing) return opening.moments.back().counts;
   const Real covered = fine.moments.back().time, seen = std::min(opening.moments.back().time, covered), finer = fine.spacing / spacing;
   // A rehearsal that was cut off goes on at its last pace.
   const Counts whole = Counts::each(fine.moments.back().counts, {}, [&](Real a, Real) { return a * end / covered; });
@@ -153,59 +172,93 @@ Forecast forecast(flow::Node& scene, const flow::AccuracyWish& wish, const flow:
   const flow::Estimate any = estimate_of(scene, kAny);
   const Real volume = any.particles * std::pow(kAny, 3);
   if (!(volume > 0)) throw InputError(wish.place, "nothing can be said of the front's error: not one particle will come out within the film");
+  const Real root2 = std::sqrt(2.0);
+  const auto work = [](const flow::Estimate& e) { return e.steps * e.mean_particles; };
+  const auto can_be_told = [&](Real own) {
+    const flow::Estimate finer = estimate_of(scene, own / root2);
+    return finer.particles <= kMostRehearsed && work(finer) <= kRehearsalWork;
+  };
   Real spacing = std::cbrt(volume / kRehearsed);
-  const bool stated = chooser.has("lava", "spacing");
-  if (stated) {
-    // A little finer than what it is to tell of: particles that lie alone say little about the flow's depth.
+  std::optional<Real> stated;
+  if (chooser.has("lava", "spacing")) {
     std::vector<Setting> told;
-    Chooser asks(scene, told);
-    spacing = std::max(spacing, asks.choose("lava", "spacing", 1, "m") / std::sqrt(2.0));
+    stated = Chooser(scene, told).choose("lava", "spacing", 1, "m");
+    // A little finer than what it is to tell of: particles that lie alone say little about the flow's depth.
+    spacing = std::max(spacing, *stated / root2);
   }
   for (int k = 0; k < 8; ++k) {
-    const flow::Estimate e = estimate_of(scene, spacing);
-    const Real work = e.steps * e.mean_particles;
-    if (work <= kRehearsalWork) break;
-    spacing *= std::pow(work / kRehearsalWork, 0.25);
+    const Real much = work(estimate_of(scene, spacing));
+    if (much <= kRehearsalWork) break;
+    spacing *= std::pow(much / kRehearsalWork, 0.25);
   }
+  Real coarser = root2 * spacing;
+  if (stated && can_be_told(*stated)) coarser = *stated, spacing = *stated / root2;
   const Real end = [&] {
     flow::Parameters root(scene);
     const flow::Scene read = flow::read_scene(root, flow::effect_kinds());
     return read.frame_time(read.frames);
   }();
 
-  Rehearsal coarse, fine;
-  try {
-    coarse = rehearse(scene, world, std::sqrt(2.0) * spacing, 4 * kRehearsalWork);
-    fine = rehearse(scene, world, spacing, 4 * kRehearsalWork);
-  } catch (const UnstableError& error) {
-    throw InputError(wish.place, fmt::format("nothing can be said of the front's error: a rehearsal with particles of {:.3g} m could not be kept stable: {}; without it, lava.spacing says how large particles are", spacing, error.what()));
-  }
-  f.rehearsed = {coarse.spacing, fine.spacing};
+  Rehearsals rehearsals(scene, world);
+  const auto [coarse, fine] = [&] {
+    try {
+      return std::pair(rehearsals.at(coarser), rehearsals.at(spacing));
+    } catch (const UnstableError& error) {
+      throw InputError(wish.place, fmt::format("nothing can be said of the front's error: a rehearsal with particles of {:.3g} m could not be kept stable: {}; without it, lava.spacing says how large particles are", spacing, error.what()));
+    }
+  }();
   f.whole = coarse.whole && fine.whole;
-  f.sample = fine.at_the_end;
   const Real difference = difference_of_fronts(coarse, fine);
   if (!std::isfinite(difference)) throw InputError(wish.place, "nothing can be said of the front's error: not one particle came out in the rehearsals");
   f.law.depth = flow_depth(fine.spacing, middle_layers(fine), difference);
 
   const Real widest = std::cbrt(volume / kLeastParticles), finest = std::cbrt(volume / kMostParticles);
-  f.spacing = chooser.choose("lava", "spacing", rounded_down(std::clamp(f.law.spacing_for(wish.front, std::min(courant, courant_for(wish.front))), finest, widest)), "m");
-  f.error = f.law.error(f.spacing, courant);
+  const auto told_by_finer = [&](Real own) -> std::optional<Real> {
+    if (!can_be_told(own)) return std::nullopt;
+    try {
+      const Rehearsal &larger = rehearsals.at(root2 * own), &mine = rehearsals.at(own), &finer = rehearsals.at(own / root2);
+      if (!larger.whole || !mine.whole || !finer.whole || !(finer.moments.back().front > 0)) return std::nullopt;
+      return refined_error(front_differences(larger, mine, finer), courant);
+    } catch (const UnstableError&) {
+      return std::nullopt;
+    }
+  };
+  f.spacing = stated ? *stated : rounded_down(std::clamp(f.law.spacing_for(wish.front, std::min(courant, courant_for(wish.front))), finest, widest));
+  std::optional<Real> told = told_by_finer(f.spacing);
+  f.refined = told.has_value();
+  f.error = told ? *told : f.law.error(f.spacing, courant);
+  while (!stated && told && f.error > wish.front && f.spacing > finest) {
+    // The error goes about as the spacing does. No longer steps than can be seen through, no shorter ones than are worth a try.
+    const Real ratio = wish.front / f.error;
+    Real finer = std::max(finest, rounded_down(f.spacing * std::clamp(ratio, 1 / root2, 0.85)));
+    told = told_by_finer(finer);
+    if (!told) finer = std::max(finest, rounded_down(f.spacing * ratio));
+    f.error = told ? *told : f.error * finer / f.spacing;
+    f.spacing = finer;
+  }
+  f.spacing = chooser.choose("lava", "spacing", f.spacing, "m");
 
-  Rehearsal opening;
-  try {
-    opening = rehearse(scene, world, f.spacing, kOpeningWork);
-  } catch (const UnstableError&) {
-    opening = fine;  // the run will say so itself
-  }
-  for (const Rehearsal* each : {&coarse, &fine, &opening}) {
-    f.rehearsed_counts = Counts::each(f.rehearsed_counts, each->moments.back().counts, std::plus<>());
-    f.rehearsed_seconds += each->moments.back().seconds;
-  }
+  const auto known = rehearsals.done().find(f.spacing);
+  const Rehearsal opening = [&] {
+    try {
+      return known != rehearsals.done().end() ? known->second : rehearse(scene, world, f.spacing, kOpeningWork);
+    } catch (const UnstableError&) {
+      return fine;  // the run will say so itself
+    }
+  }();
+  const auto add = [&](const Rehearsal& each) {
+    f.rehearsed_counts = Counts::each(f.rehearsed_counts, each.moments.back().counts, std::plus<>());
+    f.rehearsed_seconds += each.moments.back().seconds;
+  };
+  for (const auto& [h, each] : rehearsals.done()) add(each);
+  if (known == rehearsals.done().end()) add(opening);
   // One that came to the film's end is the film, to its last particle.
-  if (opening.whole && opening.spacing == f.spacing) {
-    f.rehearsed.push_back(opening.spacing);
-    f.sample = opening.at_the_end;
-  }
+  const bool is_the_film = opening.whole && opening.spacing == f.spacing;
+  const Rehearsal& sample = is_the_film ? opening : fine;
+  f.sample = sample.at_the_end;
+  f.sample_spacing = sample.spacing;
+  for (const auto& [h, each] : rehearsals.done()) f.rehearsed.insert(f.rehearsed.begin(), h);
+  if (is_the_film && known == rehearsals.done().end()) f.rehearsed.push_back(f.spacing);
   const Moment& last = fine.moments.back();
   const flow::Estimate mine = estimate_of(scene, f.spacing);
   f.counts = scaled(coarse, fine, opening, f.spacing, end);
@@ -218,7 +271,7 @@ Forecast forecast(flow::Node& scene, const flow::AccuracyWish& wish, const flow:
   constexpr Real kPower = 2.5;
   const auto to_the = [&](Real spacing_of) { return std::pow(spacing_of, kPower); };
   const Real further = (to_the(fine.spacing) - to_the(f.spacing)) / (to_the(coarse.spacing) - to_the(fine.spacing));
-  if (opening.whole && opening.spacing == f.spacing) f.front = opening.moments.back().front;
+  if (is_the_film) f.front = opening.moments.back().front;
   else f.front = std::max(0.0, last.front - further * (at_time(coarse, last.time, [](const Moment& m) { return m.front; }) - last.front));
   return f;
 }

@@ -46,6 +46,12 @@ Real flow_depth(Real spacing, Real layers, Real difference) {
   return spacing / std::max(kLeast, kLeast * std::pow(difference / kLeastDifference, kPower));
 }
 
+Real refined_error(const FrontDifferences& differences, Real courant) {
+  CHECK(courant > 0);
+  constexpr Real kFiner = 1.46, kCoarser = -0.21, kAround = 0.76;
+  return std::hypot(kFiner * differences.finer + kCoarser * differences.coarser, kAround * differences.finer_rms, kStep * courant / kUsualCourant);
+}
+
 Real courant_for(Real wanted) { return kUsualCourant * std::min(1.0, wanted / 3 / kStep); }
 
 Real tolerance_for(Real wanted) { return std::clamp(wanted / 30, 1e-4, 1e-3); }

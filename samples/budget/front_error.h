@@ -21,7 +21,8 @@ namespace effuse::budget {
 ///   e(x)     [%]   3.4   5.7   6.1   7.6   8.2   12    15    34
 ///
 /// but for the first: below, these runs have in common what they lack of the truth. On steep planes the last term sets in at once: the
-/// oil's front is off by 36 % at 1.2, by 120 % at 1.7.
+/// oil's front is off by 36 % at 1.2, by 120 % at 1.7. Of the sixty scenes of refined_error it tells 0.75 of what is measured, in the geometric mean,
+/// and scatters by exp(0.77).
 struct FrontLaw {
   Real depth = 1;  ///< H [m] > 0
 
@@ -32,6 +33,24 @@ struct FrontLaw {
 };
 
 inline constexpr Real kUsualCourant = 0.4;
+
+/// What the fronts of three runs differ by, of spacings sqrt(2) h, h and h / sqrt(2), over the last one's. Positive: the larger particles run ahead.
+struct FrontDifferences {
+  Real coarser = 0;    ///< of the first and the second: sum of products with the last one's front, over the frames
+  Real finer = 0;      ///< of the second and the last
+  Real finer_rms = 0;  ///< of these two: root mean square, over that of the last
+};
+
+/// Error of the second run's front, by these differences:
+///
+///   e^2 = (1.46 finer - 0.21 coarser)^2 + (0.76 finer_rms)^2 + (0.010 courant / 0.4)^2
+///
+/// The first is Richardson's extrapolation for an error of two powers of h, one that slows the flow (the sums', about the first power) and one that
+/// makes it run ahead (particles that lie alone, about the fourth): those would give 1.96 and -0.18. They have opposite signs, and where they cancel, at
+/// spacings about the depth, two runs may agree and both be off by a tenth: so the third run. Factors by sixty scenes drawn at random (planes,
+/// Maunga Whau, a gully, levees, a ledge, heaps; 300 to 15000 Pa s; spacings of 0.3 to 3 depths), each against half its spacing: told over measured
+/// scatters by exp(0.30); each scene left out in turn, 58 of 60 are within a factor of two. FrontLaw tells 38 of them so.
+Real refined_error(const FrontDifferences& differences, Real courant);
 
 /// Depth of a flow that was run with two sizes of particles, sqrt(2) apart [m].
 ///   spacing     the smaller one [m] > 0

@@ -9,6 +9,7 @@
 #include "flow/effects/registry.h"
 #include "flow/scene/scene.h"
 #include "flow/scene/simulation.h"
+#include "geometry/base/check.h"
 #include "geometry/base/error.h"
 #include "geometry/base/parallel.h"
 #include "geometry/base/units.h"
@@ -130,6 +131,19 @@ Real difference_of_fronts(const Rehearsal& one, const Rehearsal& other) {
     all += std::pow(other.moments[k].front, 2);
   }
   return all > 0 ? std::sqrt(off / all) : std::numeric_limits<Real>::infinity();
+}
+
+FrontDifferences front_differences(const Rehearsal& coarser, const Rehearsal& own, const Rehearsal& finer) {
+  CHECK(coarser.whole && own.whole && finer.whole);
+  Real all = 0;
+  for (const Moment& m : finer.moments) all += m.front * m.front;
+  CHECK_GT(all, 0);
+  const auto along = [&](const Rehearsal& one, const Rehearsal& other) {
+    Real sum = 0;
+    for (std::size_t k = 0; k < finer.moments.size(); ++k) sum += (one.moments[k].front - other.moments[k].front) * finer.moments[k].front;
+    return sum / all;
+  };
+  return {along(coarser, own), along(own, finer), difference_of_fronts(own, finer)};
 }
 
 }  // namespace effuse::budget

@@ -8,6 +8,7 @@
 #include "flow/scene/node.h"
 #include "flow/sph/flow_map.h"
 #include "geometry/mesh/points.h"
+#include "samples/budget/front_error.h"
 
 /// A scene's lava run with few large particles, to see where it goes and what it takes, before it is run in earnest.
 namespace effuse::budget {
@@ -66,5 +67,8 @@ Real middle_layers(const Rehearsal& rehearsal);
 /// Root mean square of the difference of two rehearsals' fronts over the frames both have, over that of the second's. Infinite when
 /// there is no front.
 Real difference_of_fronts(const Rehearsal& one, const Rehearsal& other);
+
+/// What the fronts of rehearsals of falling spacing differ by. All three came to the film's end (checked), and the last has a front (checked).
+FrontDifferences front_differences(const Rehearsal& coarser, const Rehearsal& own, const Rehearsal& finer);
 
 }  // namespace effuse::budget

@@ -67,7 +67,7 @@ SampleSkin sample_skin(const LoadedScene& loaded) {
   const budget::Forecast& f = *loaded.forecast;
   const skin::SkinSettings& s = loaded.skin;
   if (f.sample.empty() || (!s.ply && !s.obj && !s.glb && !s.vdb && !s.preview)) return {};
-  const double spacing = f.rehearsed.back(), count = static_cast<double>(f.sample.size());
+  const double spacing = f.sample_spacing, count = static_cast<double>(f.sample.size());
   const std::vector<double> radius(f.sample.size(), spacing / 2);
   geometry::Points points;
   points.position = f.sample;
@@ -177,8 +177,9 @@ Cost cost_of(const LoadedScene& loaded, const budget::Machine& machine) {
 std::vector<std::pair<std::string, std::string>> told(const budget::Forecast& f) {
   std::vector<std::pair<std::string, std::string>> lines;
   std::string rehearsed;
-  for (const double spacing : f.rehearsed) rehearsed += fmt::format("{}{:.3g}", rehearsed.empty() ? "" : " and ", spacing);
-  lines.emplace_back("accuracy", fmt::format("front within {} wanted; about {} with these settings, at {:.3g} m in the end; the flow is about {:.2g} m deep (rehearsed with particles of {} m{})", share(f.wanted), share(f.error), f.front, f.law.depth, rehearsed,
+  for (const double spacing : f.rehearsed) rehearsed += fmt::format("{}{:.3g}", rehearsed.empty() ? "" : ", ", spacing);
+  lines.emplace_back("accuracy", fmt::format("front within {} wanted; about {} with these settings ({}), at {:.3g} m in the end; the flow is about {:.2g} m deep (rehearsed with particles of {} m{})", share(f.wanted), share(f.error),
+                                             f.refined ? "as finer particles move it: to a factor of two" : "by the flow's depth alone: to a factor of four", f.front, f.law.depth, rehearsed,
                                              f.whole ? "" : ", which took too long: cut off, the rest is a guess"));
   std::string chosen, stated;
   for (const budget::Setting& s : f.settings) {

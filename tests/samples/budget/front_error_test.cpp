@@ -56,6 +56,29 @@ TEST(FrontLaw, EveryQualityCanBeHad) {
   EXPECT_GT(law.spacing_for(flow::least_front_error(), courant_for(flow::least_front_error())), 0.1) << "the least a scene may ask for";
 }
 
+/// What is told of runs whose error is slow h + alone h^4, at h = 1, and what it is beside the run of h = 1/2.
+std::pair<Real, Real> told_and_true(Real slow, Real alone) {
+  const auto error = [&](Real h) { return slow * h + alone * std::pow(h, 4); };
+  const Real root = std::sqrt(2.0), finer = error(1) - error(1 / root);
+  return {refined_error({error(root) - error(1), finer, std::abs(finer)}, kUsualCourant), std::abs(error(1) - error(0.5))};
+}
+
+TEST(RefinedError, TellsErrorsThatSlowTheFlowAndErrorsThatMakeItRunAhead) {
+  for (const auto& [slow, alone] : {std::pair{-0.1, 0.0}, {-0.3, 0.0}, {0.0, 0.05}, {0.0, 0.5}, {-0.1, 0.1}, {-0.1, 0.2}, {-0.2, 0.02}, {0.1, 0.1}}) {
+    const auto [told, real] = told_and_true(slow, alone);
+    EXPECT_LT(told, 2 * real) << slow << " " << alone;
+    EXPECT_GT(told, real / 2) << slow << " " << alone;
+  }
+  // Where the two cancel, the same to within two per cent.
+  const auto [told, real] = told_and_true(-0.1, 0.05);
+  EXPECT_NEAR(told, real, 0.02);
+}
+
+TEST(RefinedError, IsNeverLessThanTheStepsAndRisesWithIt) {
+  EXPECT_NEAR(refined_error({}, kUsualCourant), 0.01, 1e-12);
+  EXPECT_GT(refined_error({0.1, 0.02, 0.02}, 0.4), refined_error({0.1, 0.02, 0.02}, 0.2));
+}
+
 TEST(FlowDepth, IsSaidByLayersWhereParticlesLieOnOneAnother) {
   EXPECT_NEAR(flow_depth(0.3, 1.61, 0.005), 0.48, 0.01);
   EXPECT_NEAR(flow_depth(0.425, 1.275, 0.05), 0.54, 0.01) << "the gully's";

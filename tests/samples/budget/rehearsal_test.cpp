@@ -49,6 +49,27 @@ TEST(DifferenceOfFronts, IsRelativeToTheFiner) {
   EXPECT_TRUE(std::isinf(difference_of_fronts(one, other)));
 }
 
+TEST(FrontDifferences, AreSignedAndOfTheFinestsFront) {
+  Rehearsal coarser, own, finer;
+  for (Rehearsal* r : {&coarser, &own, &finer}) r->moments.resize(3), r->whole = true;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Real front = 10 * static_cast<Real>(k + 1);
+    finer.moments[k].front = front;
+    own.moments[k].front = 0.95 * front;
+    coarser.moments[k].front = 1.15 * front;
+  }
+  const FrontDifferences d = front_differences(coarser, own, finer);
+  EXPECT_NEAR(d.coarser, 0.2, 1e-12);
+  EXPECT_NEAR(d.finer, -0.05, 1e-12);
+  EXPECT_NEAR(d.finer_rms, 0.05, 1e-12);
+  // One that is ahead at first and behind later: the sum cancels, the mean square does not.
+  own.moments[0].front = 10 + 9;
+  own.moments[2].front = 30 - 3;
+  own.moments[1].front = 20;
+  EXPECT_NEAR(front_differences(coarser, own, finer).finer, 0, 1e-12);
+  EXPECT_NEAR(front_differences(coarser, own, finer).finer_rms, std::sqrt(90.0 / 1400), 1e-12);
+}
+
 flow::Node scene(const std::string& lava) {
   return importers::read_scene_text("format = 1\n[film]\nframes = 6\nfps = 1\ntime_scale = 2\n[terrain.plane]\nsize = [\"120 m\", \"120 m\"]\nslope = \"8 deg\"\n[lava]\npreset = \"etna\"\n" + lava +
                                         "\n[[lava.vent]]\nat = [-20, 0]\nwidth = \"8 m\"\nrate = \"20 m3/s\"\n",
@@ -109,6 +130,32 @@ TEST(Forecast, KeepsWhatTheSceneSaysAndChoosesTheRest) {
   EXPECT_NEAR(f.particles, 20 * 12 / std::pow(1.4, 3), 20);
   EXPECT_GT(f.error, 0);
   EXPECT_GT(f.front, 5);
+}
+
+TEST(ForecastSlow, TellsTheErrorByFinerParticlesWhereTheyCanBePaidForAndElseByTheDepth) {
+  flow::Node near = scene("spacing = \"1.4 m\""), fine = scene("spacing = \"0.2 m\"");
+  const Forecast told = forecast(near, within(0.1), flow::World{&ground()}), guessed = forecast(fine, within(0.1), flow::World{&ground()});
+  EXPECT_TRUE(told.refined);
+  ASSERT_EQ(told.rehearsed.size(), 3u);
+  EXPECT_NEAR(told.rehearsed[0], 1.4 * std::sqrt(2.0), 1e-12);
+  EXPECT_EQ(told.rehearsed[1], 1.4);
+  EXPECT_NEAR(told.rehearsed[2], 1.4 / std::sqrt(2.0), 1e-12);
+  // The film itself was rehearsed: what is told of it is what comes.
+  const Rehearsal film = rehearse(near, flow::World{&ground()}, 1.4, 1e9);
+  EXPECT_EQ(told.front, film.moments.back().front);
+  EXPECT_EQ(told.counts.pair_steps, film.moments.back().counts.pair_steps);
+  EXPECT_FALSE(guessed.refined);
+  EXPECT_EQ(guessed.error, guessed.law.error(0.2, kUsualCourant));
+}
+
+TEST(ForecastSlow, ChoosesNoSpacingWhoseErrorItKnowsToBeTooLarge) {
+  // Some hundred particles: the law's spacing can be tried.
+  for (const Real wanted : {0.05, 0.15}) {
+    flow::Node node = scene("");
+    const Forecast f = forecast(node, within(wanted), flow::World{&ground()});
+    EXPECT_TRUE(f.refined) << wanted;
+    EXPECT_LE(f.error, wanted);
+  }
 }
 
 TEST(Forecast, IsTheSameEveryTime) {

@@ -11,9 +11,8 @@
 #include "samples/effuse/load_scene.h"
 #include "tests/samples/budget/run_program.h"
 
-/// Whether what is predicted comes about, on scenes that no constant of the error's law was made with. How fine rehearsals may be was chosen
-/// among four ratios with these five in sight: of that they are no test. Of three made
-/// afterwards two miss the factor of two: told over measured 0.43 (stiff lava on Maunga Whau), 0.40 (the gully at 1200 Pa s), 1.59 (a plane of 6 deg).
+/// Whether what is predicted comes about, on scenes that no constant of it was made with: drawn at random after all of them were fixed, one for each
+/// kind of ground, and taken as they came. Of five more of that draw one is told 3.2 times too large an error (a plane of 6 degrees, 1400 Pa s, 0.69 m).
 namespace effuse::budget {
 namespace {
 
@@ -29,13 +28,16 @@ struct Trial {
 };
 
 const Trial kTrials[] = {
-    {"a fissure on Maunga Whau", 60, "[terrain]\nfile = \"SCENESmaunga-whau.asc\"\n",
-     "[[lava.vent]]\nfrom = [2667690, 6479200]\nto = [2667730, 6479195]\nwidth = \"6 m\"\nrate = \"30 m3/s\"\n[lava]\n[lava.rheology]\nviscosity = \"4000 Pa s\"\n", 1.2},
-    {"lava with strength on a plane", 40, "[terrain.plane]\nsize = [\"120 m\", \"80 m\"]\nslope = \"10 deg\"\n",
-     "[[lava.vent]]\nat = [-40, 0]\nwidth = \"6 m\"\nrate = \"12 m3/s\"\n[lava]\n[lava.rheology]\nviscosity = \"3000 Pa s\"\n[lava.rheology.yield]\nlaw = \"constant\"\nstrength = \"1500 Pa\"\n", 0.9},
-    {"lava over a ledge", 12, "[terrain]\nfile = \"SCENESledge.obj\"\n", "[[lava.vent]]\nat = [3, 10]\nwidth = \"2 m\"\nrate = \"6 m3/s\"\ntemperature = \"1150 degC\"\n[lava]\npreset = \"kilauea-mauna-ulu\"\n", 0.42},
-    {"a heap on level ground", 40, "[terrain.plane]\nsize = [\"80 m\", \"80 m\"]\n", "[[lava.vent]]\nat = [0, 0]\nwidth = \"6 m\"\nrate = \"8 m3/s\"\n[lava]\n[lava.rheology]\nviscosity = \"8000 Pa s\"\n", 0.8},
-    {"thin lava in the gully", 24, "[terrain]\nfile = \"SCENESgully.asc\"\n", "[[lava.vent]]\nat = [18, 43]\nwidth = \"4 m\"\nrate = \"6 m3/s\"\n[lava]\n[lava.rheology]\nviscosity = \"500 Pa s\"\n", 0.5},
+    {"a steep plane", 55, "[terrain.plane]\nsize = [\"200 m\", \"100 m\"]\nslope = \"21 deg\"\n",
+     "[[lava.vent]]\nat = [-80, 0]\nwidth = \"3.5 m\"\nrate = \"11 m3/s\"\n[lava]\n[lava.rheology]\nviscosity = \"5700 Pa s\"\n", 1},
+    {"stiff lava on Maunga Whau", 34, "[terrain]\nfile = \"SCENESmaunga-whau.asc\"\n",
+     "[[lava.vent]]\nfrom = [2667575, 6479279]\nto = [2667554, 6479299]\nwidth = \"4 m\"\nrate = \"17 m3/s\"\n[lava]\n[lava.rheology]\nviscosity = \"7000 Pa s\"\n", 0.7},
+    {"the gully", 14, "[terrain]\nfile = \"SCENESgully.asc\"\n",
+     "[[lava.vent]]\nat = [18, 43]\nwidth = \"5.5 m\"\nrate = \"4.3 m3/s\"\n[lava]\n[lava.rheology]\nviscosity = \"1500 Pa s\"\n", 0.42},
+    {"a heap with strength", 26, "[terrain.plane]\nsize = [\"120 m\", \"120 m\"]\n",
+     "[[lava.vent]]\nat = [0, 0]\nwidth = \"4 m\"\nrate = \"16 m3/s\"\n[lava]\n[lava.rheology]\nviscosity = \"3600 Pa s\"\n[lava.rheology.yield]\nlaw = \"constant\"\nstrength = \"940 Pa\"\n", 0.8},
+    {"over a ledge", 9, "[terrain]\nfile = \"SCENESledge.obj\"\n",
+     "[[lava.vent]]\nat = [3, 10]\nwidth = \"2.5 m\"\nrate = \"5.2 m3/s\"\n[lava]\n[lava.rheology]\nviscosity = \"250 Pa s\"\n", 0.44},
 };
 
 std::string text_of(const Trial& trial, Real spacing) {
