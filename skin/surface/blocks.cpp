@@ -115,6 +115,34 @@ Vec3 Blocks::gradient(std::span<const float> field, float outside, Index home, c
   return sum;
 }
 
+ChangedVoxels ChangedVoxels::between(const float* one, const float* other) {
+  ChangedVoxels changed = none();
+  for (int i = 0; i < kSide; ++i)
+    for (int j = 0; j < kSide; ++j) {
+      const std::size_t row = voxel_index(i, j, 0);
+      if (std::memcmp(one + row, other + row, kSide * sizeof(float)) == 0) continue;
+      for (int k = 0; k < kSide; ++k) {
+        if (std::memcmp(one + row + k, other + row + k, sizeof(float)) == 0) continue;
+        const int at[3] = {i, j, k};
+        for (std::size_t a = 0; a < 3; ++a) {
+          changed.low[a] = static_cast<std::int8_t>(std::min<int>(changed.low[a], at[a]));
+          changed.high[a] = static_cast<std::int8_t>(std::max<int>(changed.high[a], at[a]));
+        }
+      }
+    }
+  return changed;
+}
+
+std::vector<std::uint8_t> near_changed(const Blocks& blocks, std::span<const ChangedVoxels> changed, int before, int after) {
+  std::vector<std::uint8_t> marks(blocks.size(), 0);
+  for (std::size_t b = 0; b < marks.size(); ++b) {
+    if (!changed[b].any()) continue;
+    for (std::size_t slot = 0; slot < 27; ++slot)
+      if (const Index other = blocks.around(b)[slot]; other != kNone && changed[b].near_block(slot, before, after)) marks[other] = 1;
+  }
+  return marks;
+}
+
 void Blocks::padded(std::span<const float> field, float outside, std::size_t b, float* out) const {
   std::array<const float*, 27> from;
   std::array<float, kVoxels> none;  // of blocks that are not there

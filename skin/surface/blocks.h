@@ -72,6 +72,25 @@ class Blocks {
   std::shared_ptr<const Data> data_;
 };
 
+/// Voxels of a block that have changed: low .. high along each axis, and others of that box; low > high: none.
+struct ChangedVoxels {
+  std::array<std::int8_t, 3> low{0, 0, 0}, high{kSide - 1, kSide - 1, kSide - 1};
+
+  static ChangedVoxels none() { return {{kSide, kSide, kSide}, {-1, -1, -1}}; }
+  /// Where two blocks' values differ.
+  static ChangedVoxels between(const float* one, const float* other);
+  bool any() const { return low[0] <= high[0]; }
+  /// Whether one of them is within `after` voxels after the last, or `before` voxels before the first, of the block at a slot of Blocks::around.
+  bool near_block(std::size_t slot, int before, int after) const {
+    const int d[3] = {static_cast<int>(slot / 9) - 1, static_cast<int>(slot / 3 % 3) - 1, static_cast<int>(slot % 3) - 1};
+    for (std::size_t a = 0; a < 3; ++a)
+      if ((d[a] < 0 && low[a] >= after) || (d[a] > 0 && high[a] < kSide - before)) return false;
+    return any();
+  }
+};
+/// Blocks in which, or within so many voxels before and after which, a voxel has changed. changed: of each block.
+std::vector<std::uint8_t> near_changed(const Blocks& blocks, std::span<const ChangedVoxels> changed, int before, int after);
+
 /// Of each block of `blocks`, the one at the same place in `others`; kNone: there is none.
 std::vector<Index> same_places(const Blocks& blocks, const Blocks& others);
 

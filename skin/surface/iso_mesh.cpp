@@ -237,23 +237,34 @@ bool widen(const Blocks& blocks, float outside, const Field& phi, const std::vec
 }
 
 /// Where each block whose mesh is still good lies in `last`; kNone: to be made. edges: whose quads are to be made.
-std::vector<Index> still_good(const Blocks& blocks, float outside, const MeshCache& last, std::span<const Index> unchanged, std::vector<std::uint8_t>& edges) {
+std::vector<Index> still_good(const Blocks& blocks, float outside, const MeshCache& last, std::span<const Index> unchanged, std::span<const ChangedVoxels> changed,
+                              std::vector<std::uint8_t>& edges) {
   if (unchanged.empty() || last.meshed.empty() || last.outside != outside) return std::vector<Index>(blocks.size(), kNone);
-  // Values of a block or of one beside it have changed, or one beside it is gone.
-  std::vector<std::uint8_t> changed(blocks.size());
-  for (std::size_t b = 0; b < blocks.size(); ++b) changed[b] = unchanged[b] == kNone;
-  changed = widened(blocks, std::move(changed), 1);
-  mark_beside_gone(last.blocks, same_places(last.blocks, blocks), changed);
+  std::vector<ChangedVoxels> whole;
+  if (changed.empty()) {
+    whole.assign(blocks.size(), ChangedVoxels::none());
+    for (std::size_t b = 0; b < blocks.size(); ++b)
+      if (unchanged[b] == kNone) whole[b] = {};
+    changed = whole;
+  }
+  // A value that Padded holds has changed, or a block beside it is gone.
+  std::vector<std::uint8_t> anew = near_changed(blocks, changed, 1, 2);
+  mark_beside_gone(last.blocks, same_places(last.blocks, blocks), anew);
   std::vector<Index> good(unchanged.begin(), unchanged.end());
   for (std::size_t b = 0; b < blocks.size(); ++b)
-    if (changed[b]) good[b] = kNone;
-  edges = widened(blocks, std::move(changed), 1);
+    if (anew[b]) good[b] = kNone;
+  // Quads have corners in the block and in those before it.
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    edges[b] = 0;
+    for (const std::size_t slot : {0u, 1u, 3u, 4u, 9u, 10u, 12u, 13u})
+      if (const Index other = blocks.around(b)[slot]; other != kNone && anew[other]) edges[b] = 1;
+  }
   return good;
 }
 
 }  // namespace
 
-geometry::TriMesh iso_mesh(const Blocks& blocks, float outside, const Field& phi, MeshCache* last, std::span<const Index> unchanged) {
+geometry::TriMesh iso_mesh(const Blocks& blocks, float outside, const Field& phi, MeshCache* last, std::span<const Index> unchanged, std::span<const ChangedVoxels> changed) {
   ZONE("skin.iso_mesh");
   CHECK_GE(outside, 0.0f);
   CHECK_EQ(phi.size(), blocks.size() * kVoxels);
@@ -281,7 +292,7 @@ geometry::TriMesh iso_mesh(const Blocks& blocks, float outside, const Field& phi
   std::vector<std::unique_ptr<MeshedBlock>> meshed(blocks.size());
   std::vector<MeshCache::Count> count(blocks.size());
   std::vector<std::uint8_t> edges(blocks.size(), 1);
-  const std::vector<Index> good = last ? still_good(blocks, outside, *last, unchanged, edges) : std::vector<Index>(blocks.size(), kNone);
+  const std::vector<Index> good = last ? still_good(blocks, outside, *last, unchanged, changed, edges) : std::vector<Index>(blocks.size(), kNone);
   parallel_for(
       blocks.size(),
       [&](std::size_t b) {

@@ -51,8 +51,10 @@ struct MeshCache {
 ///   outside  value where there are no blocks, >= 0 (checked)
 ///   last, unchanged  the mesh is left in `last` for the next one, and taken from it for blocks in the same surroundings: of each
 ///            block whose values are those of one of last's, which; kNone for the others. Empty: for all
+///   changed  of each block, where its values are not those of last's at its place; empty: as `unchanged` says, all of a block
 /// Positions in voxels from the origin. Same bits on any number of threads. 0.16 us a triangle and thread.
 /// Source: Nielson 2004, Dual marching cubes; Wenger 2013, Isosurfaces, ch. 5 (the faces).
-geometry::TriMesh iso_mesh(const Blocks& blocks, float outside, const Field& phi, MeshCache* last = nullptr, std::span<const Index> unchanged = {});
+geometry::TriMesh iso_mesh(const Blocks& blocks, float outside, const Field& phi, MeshCache* last = nullptr, std::span<const Index> unchanged = {},
+                           std::span<const ChangedVoxels> changed = {});
 
 }  // namespace effuse::skin

@@ -127,6 +127,7 @@ Renewal renew_field(const LevelSet::Impl& s, const Making& making, SurfaceCache:
   }
   if (coords.size() > s.blocks.size() * 2 / 3) {
     std::fill(renewal.stale.begin(), renewal.stale.end(), std::uint8_t{1});
+    renewal.changed.assign(s.blocks.size(), ChangedVoxels{});
     renewal.stale_blocks = s.blocks.size();
     fill_all(s, making, last);
     return renewal;
@@ -158,14 +159,15 @@ Renewal renew_field(const LevelSet::Impl& s, const Making& making, SurfaceCache:
     rearrange(last.distance, renewal.before);
     rearrange(last.above, renewal.before);
   }
+  renewal.changed.assign(s.blocks.size(), ChangedVoxels::none());
   parallel_for(
       s.blocks.size(),
       [&](std::size_t b) {
         if (!renewal.stale[b]) return;
         const bool fresh = renewal.before[b] == kNone;
         const auto keep = [&](Field& kept, const Field& anew) { std::copy_n(&anew[kVoxels * from[b]], kVoxels, &kept[kVoxels * b]); };
-        renewal.stale[b] = fresh || std::memcmp(&last.lifted[kVoxels * b], &made[kVoxels * from[b]], kVoxels * sizeof(float)) != 0;
-        if (renewal.stale[b]) keep(last.lifted, made);
+        renewal.changed[b] = fresh ? ChangedVoxels{} : ChangedVoxels::between(&last.lifted[kVoxels * b], &made[kVoxels * from[b]]);
+        if (renewal.changed[b].any()) keep(last.lifted, made);
         if (fresh && making.terrain) {
           keep(last.distance, part_ground.distance);
           keep(last.above, part_ground.above);
@@ -234,8 +236,8 @@ Real build_cached(LevelSet::Impl& s, const Making& making, SurfaceCache::Impl& c
   if (fits) {
     renewal = renew_field(s, making, c);
     s.report.renewed = renewal.stale_blocks;
-    // Cells reach into the next block; a block that is gone leaves `outside` behind.
-    beside = widened(s.blocks, renewal.stale, 1);
+    // Cells reach into the next block by a voxel; a block that is gone leaves `outside` behind.
+    beside = near_changed(s.blocks, renewal.changed, 0, 1);
     for (std::size_t b = 0; b < beside.size(); ++b) beside[b] |= renewal.bereft[b];
     known.last = &c.volumes;
     known.last_range = &c.range;
@@ -252,8 +254,9 @@ Real build_cached(LevelSet::Impl& s, const Making& making, SurfaceCache::Impl& c
   const bool same_shift = fits && c.shift == shift.steps;
   if (same_shift) {
     s.unchanged = renewal.before;
+    s.changed = std::move(renewal.changed);
     for (std::size_t b = 0; b < s.blocks.size(); ++b)
-      if (renewal.stale[b]) s.unchanged[b] = kNone;
+      if (s.changed[b].any()) s.unchanged[b] = kNone;
   }
   {
     ZONE("skin.shift");
@@ -271,7 +274,10 @@ Real build_cached(LevelSet::Impl& s, const Making& making, SurfaceCache::Impl& c
   }
   std::vector<std::uint8_t> touched = drop_pieces(s.blocks, s.particles, making.least, s.phi, s.report, &c.pieces, s.unchanged);
   for (std::size_t b = 0; b < s.unchanged.size(); ++b)
-    if (s.unchanged[b] != kNone && (touched[b] || c.touched[s.unchanged[b]])) s.unchanged[b] = kNone;
+    if (touched[b] || (renewal.before[b] != kNone && c.touched[renewal.before[b]])) {
+      s.unchanged[b] = kNone;
+      s.changed[b] = {};
+    }
 
   Real volume = shift.volume;
   if (volume_is_known(s, making, shift)) {
@@ -279,8 +285,7 @@ Real build_cached(LevelSet::Impl& s, const Making& making, SurfaceCache::Impl& c
   } else {
     KnownVolumes final;
     if (!s.unchanged.empty()) {
-      for (std::size_t b = 0; b < s.blocks.size(); ++b) beside[b] = s.unchanged[b] == kNone;
-      beside = widened(s.blocks, std::move(beside), 1);
+      beside = near_changed(s.blocks, s.changed, 0, 1);
       for (std::size_t b = 0; b < s.blocks.size(); ++b) beside[b] |= renewal.bereft[b];
       final.last = &c.final_volumes;
       final.before = renewal.before;
@@ -323,7 +328,7 @@ LevelSet build_level_set(const geometry::Points& points, Real volume, const geom
   s.outside = s.reach - radius;
   s.lift = d / 2;  // the lowest particles float so high over the ground
   s.report.particles = points.size();
-  s.particles = ParticleGrid(points, s.voxel, std::max(1.0, s.reach / 2.0));
+  s.particles = ParticleGrid(points, s.voxel, std::max(1.0, s.reach / 2.0), last ? &last->impl().particles : nullptr);
   if (points.size() == 0) {
     if (last) *last = SurfaceCache();
     return surface;

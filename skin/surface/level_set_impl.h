@@ -56,6 +56,7 @@ struct LevelSet::Impl {
   std::uint64_t frame = 0;       ///< of its SurfaceCache; 0: made without one
   std::shared_ptr<ReturnedField> home;  ///< of that cache
   std::vector<Index> unchanged;  ///< of each block with the values of one of the frame before: which; kNone. Empty: none has
+  std::vector<ChangedVoxels> changed;  ///< of each block, unless unchanged is empty
 
   Vec3 world(const Vec3& p) const { return particles.origin() + voxel * p; }
 };

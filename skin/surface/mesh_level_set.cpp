@@ -41,7 +41,8 @@ geometry::TriMesh mesh_level_set(const LevelSet& surface, SurfaceCache* last) {
   if (last && s.frame > 0) {
     SurfaceCache::Impl& c = last->impl();
     const bool next = c.mesh_frame + 1 == s.frame;
-    mesh = iso_mesh(s.blocks, s.outside, s.phi, &c.mesh, next ? std::span<const Index>(s.unchanged) : std::span<const Index>());
+    if (next) mesh = iso_mesh(s.blocks, s.outside, s.phi, &c.mesh, s.unchanged, s.changed);
+    else mesh = iso_mesh(s.blocks, s.outside, s.phi, &c.mesh);
     c.mesh_frame = s.frame;
   } else {
     mesh = iso_mesh(s.blocks, s.outside, s.phi);

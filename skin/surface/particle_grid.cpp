@@ -37,10 +37,11 @@ Box3 checked_box(const geometry::Points& points, Real voxel) {
 }
 }  // namespace
 
-ParticleGrid::ParticleGrid(const geometry::Points& points, Real voxel, Real side) {
+ParticleGrid::ParticleGrid(const geometry::Points& points, Real voxel, Real side, const ParticleGrid* last) {
   ZONE("skin.sort");
   const auto data = std::make_shared<Data>();
   data_ = data;
+  data->voxel = voxel;
   data->side = side;
   const std::size_t n = points.size();
   const Box3 box = checked_box(points, voxel);
@@ -48,28 +49,57 @@ ParticleGrid::ParticleGrid(const geometry::Points& points, Real voxel, Real side
   CHECK_LT(n, std::size_t{kNone});
   const Real block = 512 * voxel;
   const Vec3 origin = data->origin = block * (box.center() / block).array().round().matrix();
+  const auto local = [&](std::size_t i) -> Vec3 { return (points.position[i] - origin) / voxel; };
+  const auto radius_of = [&](std::size_t i) { return static_cast<float>(points.radius[i] / voxel); };
 
-  // Columns in the order of their first particle, their particles counted, then placed.
-  const auto local = [&](const Vec3& p) -> Vec3 { return (p - origin) / voxel; };
-  std::vector<Index> column(n);
+  // Of particles that are where they were, as large as they were: their column in `last`.
+  const Data* before = last && last->data_->voxel == voxel && last->data_->side == side && last->data_->origin == origin ? last->data_.get() : nullptr;
+  std::vector<Index> stays(before ? n : 0, kNone), staying(before ? before->columns.size() : 0, 0);
+  if (before)
+    parallel_for(
+        before->columns.size(),
+        [&](std::size_t c) {
+          for (Index s = before->columns[c].begin; s < before->columns[c].end; ++s) {
+            const Index i = before->point[s];
+            if (i >= n || local(i) != before->x[s] || radius_of(i) != before->radius[s]) continue;
+            stays[i] = static_cast<Index>(c);
+            ++staying[c];
+          }
+        },
+        64);
+
+  // Columns in the order of their first particle, their particles counted.
+  std::vector<Index> column(n), now_at(staying.size(), kNone), was_at;  // columns of `last` here, and these there
   std::vector<Column>& columns = data->columns;
   // Their numbers are looked up in a table as wide as all of them where that is no waste.
-  const Vec3 lowest = local(box.min()), highest = local(box.max());
+  const Vec3 lowest = (box.min() - origin) / voxel, highest = (box.max() - origin) / voxel;
   const int x0 = column_of(lowest.x()), y0 = column_of(lowest.y());
   const std::size_t wide = static_cast<std::size_t>(column_of(highest.y()) - y0) + 1, deep = static_cast<std::size_t>(column_of(highest.x()) - x0) + 1;
   std::vector<Index> numbers(wide * deep <= 4 * n ? wide * deep : 0, kNone);
-  for (std::size_t i = 0; i < n; ++i) {
-    const Vec3 p = local(points.position[i]);
-    const int cx = column_of(p.x()), cy = column_of(p.y());
-    Index current;
-    if (numbers.empty()) {
-      current = data->table.number(pack(cx, cy, 0));
-    } else {
-      Index& known = numbers[static_cast<std::size_t>(cx - x0) * wide + static_cast<std::size_t>(cy - y0)];
-      if (known == kNone) known = data->table.number(pack(cx, cy, 0));
-      current = known;
+  const auto number = [&](int cx, int cy) {
+    Index* known = numbers.empty() ? nullptr : &numbers[static_cast<std::size_t>(cx - x0) * wide + static_cast<std::size_t>(cy - y0)];
+    if (known && *known != kNone) return *known;
+    const Index c = data->table.number(pack(cx, cy, 0));
+    if (c == columns.size()) {
+      columns.push_back({cx, cy, 0, 0});
+      was_at.push_back(kNone);
     }
-    if (current == columns.size()) columns.push_back({cx, cy, 0, 0});
+    if (known) *known = c;
+    return c;
+  };
+  for (std::size_t i = 0; i < n; ++i) {
+    Index current;
+    if (before && stays[i] != kNone) {
+      Index& there = now_at[stays[i]];
+      if (there == kNone) {
+        there = number(before->columns[stays[i]].x, before->columns[stays[i]].y);
+        was_at[there] = stays[i];
+      }
+      current = there;
+    } else {
+      const Vec3 p = local(i);
+      current = number(column_of(p.x()), column_of(p.y()));
+    }
     column[i] = current;
     ++columns[current].end;
   }
@@ -79,21 +109,66 @@ ParticleGrid::ParticleGrid(const geometry::Points& points, Real voxel, Real side
     c.begin = c.end = sum;
     sum += count;
   }
+  const auto count_of = [&](std::size_t c) { return (c + 1 < columns.size() ? columns[c + 1].begin : sum) - columns[c].begin; };
+  // Columns with the same particles as before.
+  std::vector<std::uint8_t> same(columns.size(), 0);
+  for (std::size_t c = 0; c < columns.size(); ++c) {
+    if (was_at[c] == kNone) continue;
+    const Column& was = before->columns[was_at[c]];
+    same[c] = was.end - was.begin == staying[was_at[c]] && staying[was_at[c]] == count_of(c);
+  }
   struct Placed {
-    Vec3 position;
+    Vec3 x;
     Index point;
   };
   std::vector<Placed> placed(n);
-  for (std::size_t i = 0; i < n; ++i) placed[columns[column[i]].end++] = {points.position[i], static_cast<Index>(i)};
+  for (std::size_t i = 0; i < n; ++i)
+    if (!same[column[i]]) placed[columns[column[i]].end++] = {local(i), static_cast<Index>(i)};
+  for (std::size_t c = 0; c < columns.size(); ++c) columns[c].end = columns[c].begin + count_of(c);
 
+  data->x.resize(n);
+  data->radius.resize(n);
+  data->point.resize(n);
+  // By height inside a column; the other coordinates decide between equals, so that the points' order does not matter.
+  parallel_for(
+      columns.size(),
+      [&](std::size_t c) {
+        const Index begin = columns[c].begin, end = columns[c].end;
+        if (same[c]) {
+          const Index from = before->columns[was_at[c]].begin;
+          std::copy_n(&before->x[from], end - begin, &data->x[begin]);
+          std::copy_n(&before->radius[from], end - begin, &data->radius[begin]);
+          std::copy_n(&before->point[from], end - begin, &data->point[begin]);
+        } else {
+          const auto first = placed.begin() + begin, past = placed.begin() + end;
+          const auto lower = [](const Placed& a, const Placed& b) {
+            if (a.x.z() != b.x.z()) return a.x.z() < b.x.z();
+            if (a.x.x() != b.x.x()) return a.x.x() < b.x.x();
+            if (a.x.y() != b.x.y()) return a.x.y() < b.x.y();
+            return a.point < b.point;
+          };
+          if (!std::is_sorted(first, past, lower)) std::sort(first, past, lower);  // particles born in rows are
+          for (Index s = begin; s < end; ++s) {
+            data->x[s] = placed[s].x;
+            data->point[s] = placed[s].point;
+            data->radius[s] = radius_of(placed[s].point);
+          }
+        }
+      },
+      64);
+  take_carried(points, *data);
+}
+
+void ParticleGrid::take_carried(const geometry::Points& points, Data& data) {
+  const std::size_t n = points.size();
+  Carried& carried = data.carried;
   const auto carry = [&](std::size_t size, int width) {
     if (size == 0) return -1;
     CHECK_EQ(size, n);
-    const int offset = data->carried.width;
-    data->carried.width += width;
+    const int offset = carried.width;
+    carried.width += width;
     return offset;
   };
-  Carried& carried = data->carried;
   carried.temperature = carry(points.temperature.size(), 1);
   carried.velocity = carry(points.velocity.size(), 3);
   carried.crust = carry(points.crust.size(), 1);
@@ -101,45 +176,28 @@ ParticleGrid::ParticleGrid(const geometry::Points& points, Real voxel, Real side
   carried.rest = carry(points.rest.size(), 3);
   carried.rest2 = carry(points.rest2.size(), 3);
   CHECK_LE(carried.width, kMostCarried);
-
-  data->x.resize(n);
-  data->radius.resize(n);
-  data->values.resize(n * static_cast<std::size_t>(carried.width));
-  const auto take = [&](std::size_t s) {
-    const std::size_t i = placed[s].point;
-    data->x[s] = local(placed[s].position);
-    data->radius[s] = static_cast<float>(points.radius[i] / voxel);
-    float* v = data->values.data() + s * static_cast<std::size_t>(carried.width);
-    const auto put = [&](int offset, std::span<const Real> value) {
-      if (offset >= 0) v[offset] = static_cast<float>(value[i]);
-    };
-    const auto put3 = [&](int offset, std::span<const Vec3> value) {
-      for (int a = 0; a < 3; ++a)
-        if (offset >= 0) v[offset + a] = static_cast<float>(value[i][a]);
-    };
-    put(carried.temperature, points.temperature);
-    put3(carried.velocity, points.velocity);
-    put(carried.crust, points.crust);
-    put(carried.age, points.age);
-    put3(carried.rest, points.rest);
-    put3(carried.rest2, points.rest2);
-  };
-  // By height inside a column; the other coordinates decide between equals, so that the points' order does not matter.
+  if (carried.width == 0) return;
+  data.values.resize(n * static_cast<std::size_t>(carried.width));
   parallel_for(
-      columns.size(),
-      [&](std::size_t c) {
-        const auto first = placed.begin() + columns[c].begin, end = placed.begin() + columns[c].end;
-        const auto lower = [](const Placed& a, const Placed& b) {
-          const Vec3 &p = a.position, &q = b.position;
-          if (p.z() != q.z()) return p.z() < q.z();
-          if (p.x() != q.x()) return p.x() < q.x();
-          if (p.y() != q.y()) return p.y() < q.y();
-          return a.point < b.point;
+      n,
+      [&](std::size_t s) {
+        const std::size_t i = data.point[s];
+        float* v = data.values.data() + s * static_cast<std::size_t>(carried.width);
+        const auto put = [&](int offset, std::span<const Real> value) {
+          if (offset >= 0) v[offset] = static_cast<float>(value[i]);
         };
-        if (!std::is_sorted(first, end, lower)) std::sort(first, end, lower);  // particles born in rows are
-        for (std::size_t s = columns[c].begin; s < columns[c].end; ++s) take(s);
+        const auto put3 = [&](int offset, std::span<const Vec3> value) {
+          for (int a = 0; a < 3; ++a)
+            if (offset >= 0) v[offset + a] = static_cast<float>(value[i][a]);
+        };
+        put(carried.temperature, points.temperature);
+        put3(carried.velocity, points.velocity);
+        put(carried.crust, points.crust);
+        put(carried.age, points.age);
+        put3(carried.rest, points.rest);
+        put3(carried.rest2, points.rest2);
       },
-      64);
+      2048);
 }
 
 int ParticleGrid::column_of(Real v) const {

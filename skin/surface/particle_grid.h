@@ -18,7 +18,8 @@ class ParticleGrid {
   ParticleGrid() : data_(std::make_shared<const Data>()) {}
   /// voxel: [m]; side: of a column [voxels]. Throws InputError for positions that are not finite, radii that
   /// are not finite or <= 0, and extents beyond 2^20 voxels.
-  ParticleGrid(const geometry::Points& points, Real voxel, Real side);
+  ///   last  columns in which nothing has changed are taken from it, where it has the same voxel, side and origin. The result is the same, to the bit
+  ParticleGrid(const geometry::Points& points, Real voxel, Real side, const ParticleGrid* last = nullptr);
 
   ParticleGrid(const ParticleGrid&) = default;  // and no moves: a ParticleGrid without data is none
   ParticleGrid& operator=(const ParticleGrid&) = default;
@@ -75,13 +76,15 @@ class ParticleGrid {
 
   struct Data {
     Vec3 origin = Vec3::Zero();
-    Real side = 1;
+    Real voxel = 0, side = 1;
     std::vector<Vec3> x;
     std::vector<float> radius, values;
+    std::vector<Index> point;  // of each sorted particle, its number among the points
     std::vector<Column> columns;
     KeyTable table;
     Carried carried;
   };
+  static void take_carried(const geometry::Points& points, Data& data);
   std::shared_ptr<const Data> data_;
 };
 

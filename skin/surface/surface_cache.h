@@ -56,6 +56,7 @@ struct SurfaceCache::Impl {
 struct Renewal {
   std::vector<Index> before;        ///< of each block, among the last frame's; kNone: it is new. Rising
   std::vector<std::uint8_t> stale;  ///< 1: to be computed
+  std::vector<ChangedVoxels> changed;  ///< of each block, once it is computed
   std::size_t stale_blocks = 0;
   std::vector<std::uint8_t> bereft;  ///< 1: a block beside it is gone
   std::vector<RowSet> rows;          ///< of each block, those of which the sums over particles may differ
