@@ -57,7 +57,7 @@ Real kernel_influence(float spacing, float reach);
 ///   phi     out: the field [voxels], conventions of rasterize()
 ///   weight  out: what W of rasterize() would be at the surface, for smooth(): crowd averaged with w_i, times that of a lone
 ///           particle; 0 far from particles
-///   wanted  blocks whose values are asked for, all around them being there: those of the others mean nothing; empty: all
+///   wanted  blocks whose values are asked for, all around them being there: those of the others are 0; empty: all
 /// Each voxel is summed for itself, in float, within 1e-3 voxels of double. Blocks that lie a block and more from any voxel without
 /// a particle within one spacing are filled with one value. Same bits on any number of threads and any order of the points.
 ///

@@ -3,6 +3,7 @@
 #include <array>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "skin/surface/key_table.h"
@@ -16,7 +17,28 @@ namespace effuse::skin {
 inline constexpr int kSide = 8;
 inline constexpr std::size_t kVoxels = 512;
 using BlockCoord = std::array<int, 3>;  ///< block (a, b, c) holds voxels 8a .. 8a+7, ...
-using Field = std::vector<float>;
+
+/// Leaves new numbers as they are: pages are touched first by the threads that fill them, not by one that writes zeros into all of them.
+template <class T>
+struct Unwritten : std::allocator<T> {
+  template <class U>
+  struct rebind {
+    using other = Unwritten<U>;
+  };
+  Unwritten() = default;
+  template <class U>
+  Unwritten(const Unwritten<U>&) {}
+  template <class U>
+  void construct(U* p) {
+    ::new (static_cast<void*>(p)) U;
+  }
+  template <class U, class... Args>
+  void construct(U* p, Args&&... args) {
+    ::new (static_cast<void*>(p)) U(std::forward<Args>(args)...);
+  }
+};
+/// Field(n) and resize(n) write nothing: fill it, or say Field(n, 0).
+using Field = std::vector<float, Unwritten<float>>;
 
 inline std::size_t voxel_index(int i, int j, int k) { return static_cast<std::size_t>((i << 6) | (j << 3) | k); }
 

@@ -336,8 +336,8 @@ geometry::TriMesh iso_mesh(const Blocks& blocks, float outside, const Field& phi
       for (std::size_t k = 0; k < 4; ++k) q[k] = first[quad.block[k]] + quad.vertex[k];
       const auto& p = mesh.positions;
       if (edges[b]) quad.along = (p[q[0]] - p[q[2]]).squaredNorm() <= (p[q[1]] - p[q[3]]).squaredNorm();
-      *out++ = quad.along ? geometry::Triangle{q[0], q[1], q[2]} : geometry::Triangle{q[0], q[1], q[3]};
-      *out++ = quad.along ? geometry::Triangle{q[0], q[2], q[3]} : geometry::Triangle{q[1], q[2], q[3]};
+      *out++ = {q[0], q[1], q[quad.along ? 2 : 3]};
+      *out++ = {q[quad.along ? 0 : 1], q[2], q[3]};
     }
   };
   parallel_for(

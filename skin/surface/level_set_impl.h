@@ -144,6 +144,7 @@ struct BlockPieces {
 /// Of all blocks. A block wholly inside or outside is one set, and has nothing here but that.
 struct Pieces {
   std::vector<std::int8_t> side;                     // of each block: -1 inside, 1 outside, 0 both
+  std::vector<std::uint16_t> sets;                   // how many each has, at hand: to ask the blocks themselves costs a way to memory each
   std::vector<std::unique_ptr<BlockPieces>> blocks;  // of those with both
 };
 

@@ -102,6 +102,7 @@ std::vector<std::uint8_t> drop_pieces(const Blocks& blocks, const ParticleGrid& 
   const std::size_t n = blocks.size();
   Pieces in;
   in.side.resize(n);
+  in.sets.resize(n);
   in.blocks.resize(n);
   const auto kept = [&](std::size_t b) { return !unchanged.empty() && unchanged[b] != kNone; };
   parallel_for(
@@ -109,15 +110,17 @@ std::vector<std::uint8_t> drop_pieces(const Blocks& blocks, const ParticleGrid& 
       [&](std::size_t b) {
         if (kept(b)) {
           in.side[b] = last->side[unchanged[b]];
+          in.sets[b] = last->sets[unchanged[b]];
           in.blocks[b] = std::move(last->blocks[unchanged[b]]);
           return;
         }
         std::array<std::uint8_t, kRows> row;
         in.side[b] = side_of(&phi[b * kVoxels], row);
         if (in.side[b] == 0) in.blocks[b] = std::make_unique<BlockPieces>(pieces_of(row));
+        in.sets[b] = in.blocks[b] ? static_cast<std::uint16_t>(in.blocks[b]->inside.size()) : std::uint16_t{1};
       },
       64);
-  const auto sets_of = [&](std::size_t b) { return in.blocks[b] ? in.blocks[b]->inside.size() : 1; };
+  const auto sets_of = [&](std::size_t b) { return std::size_t{in.sets[b]}; };
   const auto set_at = [&](std::size_t b, std::size_t voxel) { return in.blocks[b] ? in.blocks[b]->of[voxel] : std::uint16_t{0}; };
   const auto is_inside = [&](std::size_t b, std::size_t set) { return in.blocks[b] ? in.blocks[b]->inside[set] != 0 : in.side[b] < 0; };
   std::vector<Index> first(n + 1, 0);

@@ -175,7 +175,7 @@ struct NodesAround {
   std::array<std::array<float, 8>, kWide * kWide> nearest;  // [voxels], not squared
 };
 
-void collect(const Blocks& blocks, const std::vector<NodeSums>& nodes, float reach, std::size_t b, NodesAround& out) {
+void collect(const Blocks& blocks, const std::vector<NodeSums, Unwritten<NodeSums>>& nodes, float reach, std::size_t b, NodesAround& out) {
   for (int i = -1; i < NodesAround::kWide - 1; ++i)
     for (int j = -1; j < NodesAround::kWide - 1; ++j) {
       const std::size_t row = static_cast<std::size_t>((i + 1) * NodesAround::kWide + j + 1);

@@ -50,7 +50,7 @@ struct NodeSums {
 /// The field, and what it takes to make parts of it anew.
 struct RasterField {
   Field phi, weight;
-  std::vector<NodeSums> nodes;        ///< of each block, from kFineReach on
+  std::vector<NodeSums, Unwritten<NodeSums>> nodes;        ///< of each block, from kFineReach on
   std::vector<std::uint8_t> covered;  ///< of each block, from kFineReach on: particles lie near all its nodes
 };
 

@@ -233,7 +233,12 @@ void rasterize_anisotropic(const ParticleGrid& particles, const Kernels& kernels
     SumRows sums;
     Rows nearest;
     for (std::size_t b = begin; b < end; ++b) {
-      if (!wanted.empty() && !wanted[b]) continue;
+      if (!wanted.empty() && !wanted[b]) {
+        // Nothing is known there: whoever asks must take it for shallow.
+        std::fill_n(&phi[b * kVoxels], kVoxels, 0.0f);
+        std::fill_n(&weight[b * kVoxels], kVoxels, 0.0f);
+        continue;
+      }
       if (deep[b]) {
         std::fill_n(&phi[b * kVoxels], kVoxels, -o.radius_factor * o.spacing / 2);
         std::fill_n(&weight[b * kVoxels], kVoxels, full);

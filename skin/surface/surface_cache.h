@@ -92,8 +92,8 @@ void mark_beside_gone(const Blocks& before, std::span<const Index> after, std::v
 
 /// Values in a new order, in place: block b gets what block before[b] had, so many numbers a block. before: rising, but for kNone, whose values
 /// mean nothing then.
-template <class T>
-void rearrange(std::vector<T>& values, std::span<const Index> before, std::size_t per_block = kVoxels) {
+template <class T, class Allocator>
+void rearrange(std::vector<T, Allocator>& values, std::span<const Index> before, std::size_t per_block = kVoxels) {
   static_assert(std::is_trivially_copyable_v<T>);
   struct Run {
     std::size_t to, from, blocks;
