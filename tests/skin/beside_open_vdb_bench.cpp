@@ -64,6 +64,16 @@ Error error_of(const TriMesh& mesh, const Box3& box) {
     to_mesh += d / kSamples;
     e.most = std::max(e.most, d);
   }
+  // And from its edges, where the greatest lie: too few of the points above are near one.
+  for (int axis = 0; axis < 3; ++axis)
+    for (int edge = 0; edge < 4; ++edge)
+      for (Real along = 0; along <= size[axis]; along += 0.1) {
+        Vec3 p;
+        p[axis] = box.min()[axis] + along;
+        p[(axis + 1) % 3] = edge % 2 ? box.max()[(axis + 1) % 3] : box.min()[(axis + 1) % 3];
+        p[(axis + 2) % 3] = edge / 2 ? box.max()[(axis + 2) % 3] : box.min()[(axis + 2) % 3];
+        e.most = std::max(e.most, tree.nearest(p)->distance);
+      }
   e.mean = std::max(sum / area, to_mesh);
   return e;
 }

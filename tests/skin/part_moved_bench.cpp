@@ -78,7 +78,7 @@ void sizes(benchmark::internal::Benchmark* b) {
   for (const int n : {100000, 500000})
     for (const int layers : {0, 3})
       for (const int voxels : {4, 2}) b->Args({n, layers, voxels});
-  b->Unit(benchmark::kMillisecond)->UseManualTime()->Iterations(5);
+  b->Unit(benchmark::kMillisecond)->UseManualTime()->Iterations(15);
 }
 BENCHMARK(patch_moved)->Apply(sizes);
 BENCHMARK(front_moved)->Apply(sizes);
