@@ -191,8 +191,6 @@ Forecast forecast(flow::Node& scene, const flow::AccuracyWish& wish, const flow:
     if (much <= kRehearsalWork) break;
     spacing *= std::pow(much / kRehearsalWork, 0.25);
   }
-  Real coarser = root2 * spacing;
-  if (stated && can_be_told(*stated)) coarser = *stated, spacing = *stated / root2;
   const Real end = [&] {
     flow::Parameters root(scene);
     const flow::Scene read = flow::read_scene(root, flow::effect_kinds());
@@ -200,6 +198,24 @@ Forecast forecast(flow::Node& scene, const flow::AccuracyWish& wish, const flow:
   }();
 
   Rehearsals rehearsals(scene, world);
+  const auto told_by_finer = [&](Real own) -> std::optional<Real> {
+    if (!can_be_told(own)) return std::nullopt;
+    try {
+      for (const Real each : {root2 * own, own, own / root2})
+        if (const Rehearsal& r = rehearsals.at(each); !r.whole || !(r.moments.back().front > 0)) return std::nullopt;
+    } catch (const UnstableError&) {
+      return std::nullopt;
+    } catch (const InputError&) {
+      return std::nullopt;  // what the scene's own particles are not too large or too small for
+    }
+    return refined_error(front_differences(rehearsals.at(root2 * own), rehearsals.at(own), rehearsals.at(own / root2)), courant);
+  };
+  std::optional<Real> told;
+  Real coarser = root2 * spacing;
+  if (stated) {
+    told = told_by_finer(*stated);
+    if (told) coarser = *stated, spacing = *stated / root2;
+  }
   const auto [coarse, fine] = [&] {
     try {
       return std::pair(rehearsals.at(coarser), rehearsals.at(spacing));
@@ -213,29 +229,10 @@ Forecast forecast(flow::Node& scene, const flow::AccuracyWish& wish, const flow:
   f.law.depth = flow_depth(fine.spacing, middle_layers(fine), difference);
 
   const Real widest = std::cbrt(volume / kLeastParticles), finest = std::cbrt(volume / kMostParticles);
-  const auto told_by_finer = [&](Real own) -> std::optional<Real> {
-    if (!can_be_told(own)) return std::nullopt;
-    try {
-      const Rehearsal &larger = rehearsals.at(root2 * own), &mine = rehearsals.at(own), &finer = rehearsals.at(own / root2);
-      if (!larger.whole || !mine.whole || !finer.whole || !(finer.moments.back().front > 0)) return std::nullopt;
-      return refined_error(front_differences(larger, mine, finer), courant);
-    } catch (const UnstableError&) {
-      return std::nullopt;
-    }
-  };
   f.spacing = stated ? *stated : rounded_down(std::clamp(f.law.spacing_for(wish.front, std::min(courant, courant_for(wish.front))), finest, widest));
-  std::optional<Real> told = told_by_finer(f.spacing);
-  f.refined = told.has_value();
-  f.error = told ? *told : f.law.error(f.spacing, courant);
-  while (!stated && told && f.error > wish.front && f.spacing > finest) {
-    // The error goes about as the spacing does. No longer steps than can be seen through, no shorter ones than are worth a try.
-    const Real ratio = wish.front / f.error;
-    Real finer = std::max(finest, rounded_down(f.spacing * std::clamp(ratio, 1 / root2, 0.85)));
-    told = told_by_finer(finer);
-    if (!told) finer = std::max(finest, rounded_down(f.spacing * ratio));
-    f.error = told ? *told : f.error * finer / f.spacing;
-    f.spacing = finer;
-  }
+  if (!stated) told = told_by_finer(f.spacing);
+  f.error = told.value_or(f.law.error(f.spacing, courant));
+  f.told_by = told ? ErrorBy::kRehearsals : ErrorBy::kDepth;
   f.spacing = chooser.choose("lava", "spacing", f.spacing, "m");
 
   const auto known = rehearsals.done().find(f.spacing);
@@ -257,14 +254,15 @@ Forecast forecast(flow::Node& scene, const flow::AccuracyWish& wish, const flow:
   const Rehearsal& sample = is_the_film ? opening : fine;
   f.sample = sample.at_the_end;
   f.sample_spacing = sample.spacing;
-  for (const auto& [h, each] : rehearsals.done()) f.rehearsed.insert(f.rehearsed.begin(), h);
+  for (const auto& [h, each] : rehearsals.done()) f.rehearsed.push_back(h);
   if (is_the_film && known == rehearsals.done().end()) f.rehearsed.push_back(f.spacing);
+  std::sort(f.rehearsed.begin(), f.rehearsed.end(), std::greater<>());
   const Moment& last = fine.moments.back();
   const flow::Estimate mine = estimate_of(scene, f.spacing);
   f.counts = scaled(coarse, fine, opening, f.spacing, end);
   // What lies on the ground, of what was let out: some may have left over the edge.
   const Real stays = last.particles > 0 && f.whole ? last.particles / std::max(last.particles, estimate_of(scene, fine.spacing).particles) : 1;
-  f.particles = mine.particles * stays;
+  f.particles = is_the_film ? opening.moments.back().particles : mine.particles * stays;
   f.mean_particles = mine.mean_particles;
   f.solver_bytes = std::max(last.bytes / std::max(last.particles, 1.0), opening.moments.back().bytes / std::max(opening.moments.back().particles, 1.0)) * f.particles;
   // The front goes on towards the converged one as it went from the coarser rehearsal to the finer.

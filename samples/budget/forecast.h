@@ -21,11 +21,14 @@ struct Setting {
   bool of_the_scene = false;  ///< stated there: it stands
 };
 
+/// What an error was told by: the flow's depth (FrontLaw), or rehearsals of that spacing and of a finer and a larger one (refined_error).
+enum class ErrorBy { kDepth, kRehearsals };
+
 struct Forecast {
   std::vector<Setting> settings;
   Real wanted = 0;            ///< error of the front [share]
   Real error = 0;             ///< predicted, with these settings
-  bool refined = false;       ///< by rehearsals of that spacing and of finer ones; else by the flow's depth alone
+  ErrorBy told_by = ErrorBy::kDepth;
   Real spacing = 0;           ///< [m]
   Real front = 0;             ///< predicted at the film's end [m]
   Real particles = 0, mean_particles = 0;  ///< at the film's end, over the film
@@ -50,8 +53,9 @@ struct Forecast {
 /// 2. Two rehearsals, of spacings sqrt(2) apart, the finer with about kRehearsed particles at the end, fewer where the film asks for so many
 ///    steps that they would take longer than some seconds. Where the scene says its spacing: that one and the next finer, if those can be paid for (4.).
 /// 3. The flow's depth by them (flow_depth), and the spacing by FrontLaw, to two digits, downwards; at most what makes kLeastParticles, at least what makes kMostParticles.
-/// 4. Where a rehearsal sqrt(2) finer than that has at most kMostRehearsed particles: that one, the spacing's own and the next coarser tell the error
-///    (refined_error); a spacing that was chosen is made finer while they tell more than is wanted, and by the first power of it where finer ones take too long. Elsewhere FrontLaw tells it.
+/// 4. Where a rehearsal sqrt(2) finer than that has at most kMostRehearsed particles and kRehearsalWork: that one, the spacing's own and the next coarser tell
+///    the error (refined_error), if all three come to the film's end. Elsewhere FrontLaw tells it. A spacing that was chosen stays, also where they tell more than
+///    was wanted: they are right to a factor of two themselves.
 /// 5. The opening at that spacing, for a while, where it was not rehearsed: how many steps and iterations it takes, against the finer rehearsal's for the same time.
 ///
 /// Steps, iterations and particles of the rest go as the finer rehearsal's did, times what the opening told. Throws InputError at the wish's

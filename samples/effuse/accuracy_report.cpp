@@ -11,7 +11,7 @@ std::string accuracy_json(const budget::Forecast& f, const Cost& cost, const std
   j["wanted"] = f.wanted;
   for (const budget::Setting& s : f.settings) j[s.of_the_scene ? "kept" : "chosen"][s.key] = s.value;
   j["rehearsed_m"] = f.rehearsed;
-  j["front_error_by"] = f.refined ? "rehearsals" : "depth";
+  j["front_error_by"] = f.told_by == budget::ErrorBy::kRehearsals ? "rehearsals" : "depth";
   j["predicted"] = {{"front_error", f.error},
                     {"front_m", f.front},
                     {"particles", f.particles},

@@ -179,7 +179,7 @@ std::vector<std::pair<std::string, std::string>> told(const budget::Forecast& f)
   std::string rehearsed;
   for (const double spacing : f.rehearsed) rehearsed += fmt::format("{}{:.3g}", rehearsed.empty() ? "" : ", ", spacing);
   lines.emplace_back("accuracy", fmt::format("front within {} wanted; about {} with these settings ({}), at {:.3g} m in the end; the flow is about {:.2g} m deep (rehearsed with particles of {} m{})", share(f.wanted), share(f.error),
-                                             f.refined ? "as finer particles move it: to a factor of two" : "by the flow's depth alone: to a factor of four", f.front, f.law.depth, rehearsed,
+                                             f.told_by == budget::ErrorBy::kRehearsals ? "as finer particles move it: to a factor of two" : "by the flow's depth alone: to a factor of four", f.front, f.law.depth, rehearsed,
                                              f.whole ? "" : ", which took too long: cut off, the rest is a guess"));
   std::string chosen, stated;
   for (const budget::Setting& s : f.settings) {
@@ -190,7 +190,7 @@ std::vector<std::pair<std::string, std::string>> told(const budget::Forecast& f)
   if (!stated.empty()) lines.emplace_back("kept", stated + ": the scene says so");
   if (f.error > 1.05 * f.wanted)
     for (const budget::Setting& s : f.settings)
-      if (s.key == "lava.spacing") lines.emplace_back("short of it", s.of_the_scene ? fmt::format("the scene's spacing leaves about {}: without lava.spacing it would be chosen", share(f.error)) : fmt::format("no spacing within reason gets to {}", share(f.wanted)));
+      if (s.key == "lava.spacing") lines.emplace_back("short of it", s.of_the_scene ? fmt::format("the scene's spacing leaves about {}: without lava.spacing it would be chosen", share(f.error)) : fmt::format("{} m was chosen by the flow's depth, finer particles tell of {}: ask for less, or state lava.spacing", fmt::format("{:.3g}", f.spacing), share(f.error)));
   return lines;
 }
 

@@ -240,6 +240,8 @@ bool widen(const Blocks& blocks, float outside, const Field& phi, const std::vec
 std::vector<Index> still_good(const Blocks& blocks, float outside, const MeshCache& last, std::span<const Index> unchanged, std::span<const ChangedVoxels> changed,
                               std::vector<std::uint8_t>& edges) {
   if (unchanged.empty() || last.meshed.empty() || last.outside != outside) return std::vector<Index>(blocks.size(), kNone);
+  CHECK(unchanged.size() == blocks.size() && (changed.empty() || changed.size() == blocks.size()));
+  for (std::size_t b = 0; b < changed.size(); ++b) CHECK(changed[b].any() == (unchanged[b] == kNone));
   std::vector<ChangedVoxels> whole;
   if (changed.empty()) {
     whole.assign(blocks.size(), ChangedVoxels::none());

@@ -102,7 +102,7 @@ inline constexpr float kCoverBand = 2;
 struct KnownVolumes {
   const std::map<int, std::vector<Real>>* last = nullptr;
   std::span<const Index> before;         ///< of each block, among the last frame's
-  std::span<const std::uint8_t> stale;   ///< or a cell of it reaches into a block that is
+  std::span<const std::uint8_t> stale;   ///< 1: a voxel that one of its cells has at a corner has changed
   int guess = 0;                         ///< the last frame's shift, in steps: where to look first
   std::map<int, std::vector<Real>> now;
   /// Least and greatest value of each block, low > high: not looked for.

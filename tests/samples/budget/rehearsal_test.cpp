@@ -135,7 +135,7 @@ TEST(Forecast, KeepsWhatTheSceneSaysAndChoosesTheRest) {
 TEST(ForecastSlow, TellsTheErrorByFinerParticlesWhereTheyCanBePaidForAndElseByTheDepth) {
   flow::Node near = scene("spacing = \"1.4 m\""), fine = scene("spacing = \"0.2 m\"");
   const Forecast told = forecast(near, within(0.1), flow::World{&ground()}), guessed = forecast(fine, within(0.1), flow::World{&ground()});
-  EXPECT_TRUE(told.refined);
+  EXPECT_EQ(told.told_by, ErrorBy::kRehearsals);
   ASSERT_EQ(told.rehearsed.size(), 3u);
   EXPECT_NEAR(told.rehearsed[0], 1.4 * std::sqrt(2.0), 1e-12);
   EXPECT_EQ(told.rehearsed[1], 1.4);
@@ -144,18 +144,18 @@ TEST(ForecastSlow, TellsTheErrorByFinerParticlesWhereTheyCanBePaidForAndElseByTh
   const Rehearsal film = rehearse(near, flow::World{&ground()}, 1.4, 1e9);
   EXPECT_EQ(told.front, film.moments.back().front);
   EXPECT_EQ(told.counts.pair_steps, film.moments.back().counts.pair_steps);
-  EXPECT_FALSE(guessed.refined);
+  EXPECT_EQ(guessed.told_by, ErrorBy::kDepth);
   EXPECT_EQ(guessed.error, guessed.law.error(0.2, kUsualCourant));
 }
 
-TEST(ForecastSlow, ChoosesNoSpacingWhoseErrorItKnowsToBeTooLarge) {
-  // Some hundred particles: the law's spacing can be tried.
-  for (const Real wanted : {0.05, 0.15}) {
-    flow::Node node = scene("");
-    const Forecast f = forecast(node, within(wanted), flow::World{&ground()});
-    EXPECT_TRUE(f.refined) << wanted;
-    EXPECT_LE(f.error, wanted);
-  }
+TEST(Forecast, TakesSpacingsThatOnlyLargerOnesWouldBeRefusedFor) {
+  // 2.4 m from a vent of 0.5 m is legal, 3.4 m is not.
+  flow::Node node = scene("spacing = \"2.4 m\"");
+  importers::apply_override(node, "lava.vent[0].width=0.5 m");
+  importers::apply_override(node, "lava.vent[0].rate=30 m3/s");
+  const Forecast f = forecast(node, within(0.1), flow::World{&ground()});
+  EXPECT_EQ(f.spacing, 2.4);
+  EXPECT_EQ(f.told_by, ErrorBy::kDepth);
 }
 
 TEST(Forecast, IsTheSameEveryTime) {

@@ -23,6 +23,7 @@ void expect_same(const ParticleGrid& one, const ParticleGrid& other) {
   EXPECT_EQ(one.x(), other.x());
   EXPECT_EQ(one.radius(), other.radius());
   ASSERT_EQ(one.columns().size(), other.columns().size());
+  for (const ParticleGrid::Column& c : one.columns()) EXPECT_EQ(one.column(c.x, c.y), &c);
   for (std::size_t c = 0; c < one.columns().size(); ++c) EXPECT_EQ(std::memcmp(&one.columns()[c], &other.columns()[c], sizeof(ParticleGrid::Column)), 0) << c;
   ASSERT_EQ(one.carried().width, other.carried().width);
   EXPECT_EQ(std::memcmp(one.values(0), other.values(0), one.size() * static_cast<std::size_t>(one.carried().width) * sizeof(float)), 0);
@@ -84,6 +85,7 @@ TEST(ParticleGrid, MadeFromTheLastIsTheSameToTheBit) {
   next("all moved, to another origin");
   const ParticleGrid coarse(cloud.points(), 0.5, 4, &last);
   expect_same(coarse, ParticleGrid(cloud.points(), 0.5, 4));
+  expect_same(ParticleGrid(cloud.points(), 0.25, 6, &last), ParticleGrid(cloud.points(), 0.25, 6));
 }
 
 }  // namespace

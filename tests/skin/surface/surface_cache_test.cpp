@@ -356,7 +356,7 @@ void expect_as_alone(const Creeping& lava, SurfaceCache& cache, int frame) {
   ASSERT_EQ(a.triangles, b.triangles) << "frame " << frame;
 }
 
-TEST(SurfaceCache, OneParticleAFrameMovesNoMoreThanWhatIsMadeAnew) {
+TEST(SurfaceCache, AFrameInWhichOneParticleMovedIsTheOneMadeAlone) {
   Creeping lava;
   lava.options.match_volume = false;
   SurfaceCache cache;
