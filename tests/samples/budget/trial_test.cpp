@@ -11,8 +11,8 @@
 #include "samples/effuse/load_scene.h"
 #include "tests/samples/budget/run_program.h"
 
-/// Whether what is predicted comes about, on scenes that no constant of it was made with: drawn at random after all of them were fixed, one for each
-/// kind of ground, and taken as they came. Of five more of that draw one is told 3.2 times too large an error (a plane of 6 degrees, 1400 Pa s, 0.69 m).
+/// Whether what is predicted comes about, on scenes that no constant of it was made with: drawn at random after all of them were fixed, one for each of five
+/// kinds of ground, and taken as they came. Of five more of that draw one is told 3.2 times too large an error (a plane of 6 degrees, 1400 Pa s, 0.69 m).
 namespace effuse::budget {
 namespace {
 
